@@ -1,0 +1,1 @@
+"""The contract: keys, messages, bytes, the session on the bus, and the same messages at rest."""
