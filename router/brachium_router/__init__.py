@@ -1,0 +1,1 @@
+"""The Zenoh router of a room, in a Python process."""
