@@ -7,6 +7,7 @@ program loses its own oldest messages, counts them, and holds nobody up.
 
 import json
 import logging
+import re
 import threading
 import time
 from collections import deque
@@ -17,6 +18,8 @@ from typing import Any, Self
 import zenoh
 
 from brachium_wire import keys
+from brachium_wire.codec import encode
+from brachium_wire.messages import Answer
 from brachium_wire.topics import TOPICS, Urgency
 
 log = logging.getLogger(__name__)
@@ -32,8 +35,11 @@ _PRIORITY = {
 }
 
 
+_ENDPOINT = re.compile(r"(tcp|tls|quic|udp|ws)/[^\s/?#]+:[0-9]{1,5}([?#]\S*)?|unixsock-stream/\S+")
+
+
 class NoRouter(RuntimeError):
-    """No router answered at the endpoint."""
+    """No router answered at the endpoint, or nothing can be an endpoint that is written so."""
 
 
 def client_config(endpoint: str) -> zenoh.Config:
@@ -55,10 +61,16 @@ def client_config(endpoint: str) -> zenoh.Config:
 
 
 class Inbox:
-    """What a subscription received and nobody read yet; the oldest is dropped, and counted, when it is full."""
+    """What a subscription received and nobody read yet; the oldest is dropped, and counted, when it is full.
+
+    `received` counts all arrivals, `dropped` those of them that nobody will read.
+    """
 
     def __init__(self, capacity: int) -> None:
         self._queue: deque[tuple[str, bytes]] = deque(maxlen=capacity)
+        self._lock = (
+            threading.Lock()
+        )  # held for an append or a copy: the counts are exact, no arrival is missed
         self._arrived = threading.Event()
         self._wake: Callable[[], None] | None = None
         self.received = 0
@@ -66,10 +78,10 @@ class Inbox:
 
     def drain(self) -> list[tuple[str, bytes]]:
         """Return all (key, payload) received since the last call, in order of arrival."""
-        self._arrived.clear()
-        out = []
-        while self._queue:
-            out.append(self._queue.popleft())
+        with self._lock:
+            out = list(self._queue)
+            self._queue.clear()
+            self._arrived.clear()
         return out
 
     def wait(self, timeout_s: float) -> bool:
@@ -77,27 +89,42 @@ class Inbox:
         return self._arrived.wait(timeout_s)
 
     def on_arrival(self, wake: Callable[[], None]) -> None:
-        """Call `wake` from Zenoh's thread at each arrival after a drain; it must not block."""
-        self._wake = wake
+        """Call `wake` from Zenoh's thread at the first arrival after each drain; it must not block.
+
+        It is called at once if something is there already.
+        """
+        with self._lock:
+            self._wake = wake
+            waiting = bool(self._queue)
+        if waiting:
+            wake()
 
     def put(self, key: str, payload: bytes) -> None:
         """Append one message."""
-        self.received += 1
-        if len(self._queue) == self._queue.maxlen:
-            self.dropped += 1
-        self._queue.append((key, payload))
-        if not self._arrived.is_set():
+        with self._lock:
+            self.received += 1
+            self.dropped += len(self._queue) == self._queue.maxlen
+            self._queue.append((key, payload))
+            wake = None if self._arrived.is_set() else self._wake
             self._arrived.set()
-            if self._wake is not None:
-                self._wake()
+        if wake is not None:
+            wake()
 
 
 class Bus:
-    """A client of the room's router. Use it in a `with` block: a session left open keeps the process alive."""
+    """A client of the room's router. Use it in a `with` block: a session left open keeps the process alive.
+
+    Any thread may call it. Callbacks run on Zenoh's threads, one each; one that blocks holds up every subscription
+    of this bus. Keys and key expressions that are not ours raise keys.BadKey before Zenoh sees them (a key beyond
+    64 kB would break its session for good).
+    """
 
     def __init__(self, session: zenoh.Session, endpoint: str) -> None:
         self._session = session
         self.endpoint = endpoint
+        self._lock = threading.Lock()
+        self._retaining = threading.Lock()
+        self._closed = False
         self._publishers: dict[str, zenoh.Publisher] = {}
         self._kept: list[Any] = []
         self._retained: dict[str, bytes] = {}
@@ -114,6 +141,8 @@ class Bus:
 
         Raises NoRouter with one line that says what to do.
         """
+        if not _ENDPOINT.fullmatch(endpoint):
+            raise NoRouter(f"endpoint {endpoint[:80]!r} cannot be used: write it as tcp/<host>:<port>")
         stop = stop or threading.Event()
         deadline = None if timeout_s is None else time.monotonic() + timeout_s
         warned = False
@@ -123,7 +152,9 @@ class Bus:
             except zenoh.ZError as error:
                 reason = str(error).split(" at /")[0]
             if deadline is not None and time.monotonic() >= deadline:
-                raise NoRouter(f"no router at {endpoint} ({reason}); start one with: brachium router") from None
+                raise NoRouter(
+                    f"no router at {endpoint} ({reason}); start one with: brachium router"
+                ) from None
             if not warned:
                 log.warning("waiting for the router at %s", endpoint)
                 warned = True
@@ -135,34 +166,61 @@ class Bus:
         return bool(self._session.info.routers_zid())
 
     def put(self, key: str, payload: bytes) -> None:
-        """Publish on a key of the topic table with that topic's QoS. Never blocks, never raises for a lost router."""
-        publisher = self._publishers.get(key)
-        if publisher is None:
-            row = TOPICS[keys.parse(key).topic]
-            publisher = self._session.declare_publisher(
-                key,
-                priority=_PRIORITY[row.urgency],
-                congestion_control=zenoh.CongestionControl.DROP,
-                express=False,
-            )
-            self._publishers[key] = publisher
-        publisher.put(payload)
+        """Publish on a key of the topic table with that topic's QoS.
+
+        Never blocks; never raises for a lost router or a closed bus: what nobody can receive is lost.
+        """
+        try:
+            (self._publishers.get(key) or self._publisher(key)).put(payload)
+        except zenoh.ZError as error:
+            if not self._closed:
+                raise
+            log.debug("put after close on %s: %s", key, error)
+
+    def _publisher(self, key: str) -> zenoh.Publisher:
+        row = TOPICS.get(keys.parse(key).topic)
+        if row is None:
+            raise keys.BadKey(f"nothing is put on {key!r}: it is a token or a query")
+        publisher = self._session.declare_publisher(
+            key,
+            priority=_PRIORITY[row.urgency],
+            congestion_control=zenoh.CongestionControl.DROP,
+            express=False,
+        )
+        # No lock while Zenoh declares; of two made at once the second, still unused, goes.
+        first = self._publishers.setdefault(key, publisher)
+        if first is not publisher:
+            publisher.undeclare()
+        return first
 
     def retain(self, key: str, payload: bytes) -> None:
-        """Publish on a key and answer who asks for it later with the last value, as long as this bus is open."""
-        known = key in self._retained
-        self._retained[key] = payload
-        if not known:
+        """Publish on a key and answer who asks for it later with the last value, as long as this bus is open.
+
+        Who subscribes, then fetches, and reads what it fetched before what it received, ends with the last value.
+        """
+        keys.parse(key)
+        with self._lock:
+            known = key in self._retained
+            self._retained.setdefault(key, payload)
+        if not known and not self._closed:  # before the put: who comes between the two must find the value
 
             def answer(query: zenoh.Query) -> None:
                 query.reply(key, self._retained[key])
 
-            self._kept.append(self._session.declare_queryable(key, answer))
-        self.put(key, payload)
+            self._keep(self._session.declare_queryable(key, answer))
+        with self._retaining:  # the order of what is kept is the order of what is put
+            self._retained[key] = payload
+            self.put(key, payload)
+
+    def _keep(self, declared: Any) -> None:
+        with self._lock:
+            self._kept.append(declared)  # Zenoh undeclares what nobody holds
 
     def fetch(self, key_expression: str, timeout_s: float = 1.0) -> list[tuple[str, bytes]]:
         """Return the retained (key, payload) that match; empty when there is none."""
-        replies = self._session.get(key_expression, timeout=timeout_s, target=zenoh.QueryTarget.ALL)
+        replies = self._session.get(
+            keys.expression(key_expression), timeout=timeout_s, target=zenoh.QueryTarget.ALL
+        )
         return [(str(r.ok.key_expr), r.ok.payload.to_bytes()) for r in replies if r.ok is not None]
 
     def subscribe(self, key_expression: str, capacity: int = 16384) -> Inbox:
@@ -173,41 +231,61 @@ class Bus:
             if sample.kind == zenoh.SampleKind.PUT:
                 inbox.put(str(sample.key_expr), sample.payload.to_bytes())
 
-        self._kept.append(self._session.declare_subscriber(key_expression, heard))
+        self._keep(self._session.declare_subscriber(keys.expression(key_expression), heard))
         return inbox
 
     def serve(self, key_expression: str, answer: Callable[[str, bytes], bytes]) -> None:
-        """Answer queries on matching keys: `answer(key, question)` runs on Zenoh's thread and returns the bytes."""
+        """Answer queries on matching keys: `answer(key, question)` runs on Zenoh's thread and returns the bytes.
+
+        `key` is always one plain key: a query on a wildcard, which may only look for retained values, is refused
+        here. When `answer` raises, the error is logged and the asker gets an Answer that says so.
+        """
 
         def asked(query: zenoh.Query) -> None:
-            question = query.payload
             key = str(query.key_expr)
-            query.reply(key, answer(key, question.to_bytes() if question is not None else b""))
+            if "*" in key:
+                query.reply_err(f"{key}: one key at a time is answered here")
+                return
+            question = query.payload
+            try:
+                payload = answer(key, b"" if question is None else question.to_bytes())
+            except Exception as error:
+                log.exception("answering %s", key)
+                payload = encode(
+                    Answer(ok=False, reason=f"failed inside: {_line(error)}; see the service's log")
+                )
+            query.reply(key, payload)
 
-        self._kept.append(self._session.declare_queryable(key_expression, asked))
+        self._keep(self._session.declare_queryable(keys.expression(key_expression), asked))
 
     def ask(self, key: str, question: bytes = b"", timeout_s: float = 2.0) -> bytes | None:
         """Return the first answer to a query, or None when nobody answers in time."""
-        for reply in self._session.get(key, payload=question, timeout=timeout_s):
+        keys.parse(key)
+        for reply in self._session.get(
+            key, payload=question, timeout=timeout_s, priority=_PRIORITY[Urgency.CONTROL]
+        ):
             if reply.ok is not None:
                 return reply.ok.payload.to_bytes()
         return None
 
     def announce(self, key: str) -> Callable[[], None]:
         """Hold a liveliness token on `key` until the returned function is called or the bus is closed."""
+        keys.parse(key)
         token = self._session.liveliness().declare_token(key)
-        self._kept.append(token)
+        self._keep(token)
 
         def end() -> None:
-            if token in self._kept:
-                self._kept.remove(token)
+            with self._lock:
+                held = any(kept is token for kept in self._kept)
+                self._kept = [kept for kept in self._kept if kept is not token]
+            if held and not self._closed:
                 token.undeclare()
 
         return end
 
     def alive(self, key_expression: str, timeout_s: float = 1.0) -> list[str]:
         """Return the keys of the liveliness tokens that match now."""
-        replies = self._session.liveliness().get(key_expression, timeout=timeout_s)
+        replies = self._session.liveliness().get(keys.expression(key_expression), timeout=timeout_s)
         return [str(r.ok.key_expr) for r in replies if r.ok is not None]
 
     def watch_alive(self, key_expression: str, changed: Callable[[str, bool], None]) -> None:
@@ -216,10 +294,18 @@ class Bus:
         def heard(sample: zenoh.Sample) -> None:
             changed(str(sample.key_expr), sample.kind == zenoh.SampleKind.PUT)
 
-        self._kept.append(self._session.liveliness().declare_subscriber(key_expression, heard, history=True))
+        self._keep(
+            self._session.liveliness().declare_subscriber(
+                keys.expression(key_expression), heard, history=True
+            )
+        )
 
     def close(self) -> None:
-        """Leave the bus. Closing twice is harmless."""
+        """Leave the bus: tokens vanish, retained values are no longer answered. Closing twice is harmless.
+
+        A callback that runs meanwhile is not waited for; what it puts is lost.
+        """
+        self._closed = True
         try:
             self._session.close()
         except zenoh.ZError as error:
@@ -232,3 +318,7 @@ class Bus:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.close()
+
+
+def _line(error: Exception) -> str:
+    return " ".join(str(error).split())[:200] or type(error).__name__

@@ -1,9 +1,9 @@
 """Keys are built and read here and nowhere else.
 
-    brachium/<room>/<subject>/imu/<segment>[/info|/status]
-    brachium/<room>/<subject>/skeleton/<side> | truth/<side> | calibration | session | event | snapshot
-    brachium/<room>/<subject>/command/<verb>
-    brachium/<room>/service/<kind>/<id>[/alive|/time]
+brachium/<room>/<subject>/imu/<segment>[/info|/status]
+brachium/<room>/<subject>/skeleton/<side> | truth/<side> | calibration | session | event | snapshot
+brachium/<room>/<subject>/command/<verb>
+brachium/<room>/service/<kind>/<id>[/alive|/time]
 """
 
 import re
@@ -26,7 +26,7 @@ def chunk(name: str, what: str = "name") -> str:
     """Return `name` if it may stand in a key, or raise BadKey saying what may."""
     if not isinstance(name, str) or not _CHUNK.match(name):
         raise BadKey(
-            f"{what} {name!r} cannot be used: write 1 to 64 of A-Z a-z 0-9 _ - and, not first, a dot"
+            f"{what} {str(name)[:80]!r} cannot be used: write 1 to 64 of A-Z a-z 0-9 _ - and, not first, a dot"
         )
     return name
 
@@ -133,6 +133,18 @@ def services(room: str, tail: str = "*/*") -> str:
     return f"{ROOT}/{chunk(room, 'room')}/{SERVICE}/{tail}"
 
 
+def expression(text: str) -> str:
+    """Return `text` if every chunk of it may stand in a key or is the wildcard `*` or `**`, or raise BadKey."""
+    if not isinstance(text, str) or len(text) > 1024:
+        raise BadKey(
+            f"key expression {str(text)[:80]!r} cannot be used: expected text of at most 1024 characters"
+        )
+    for part in text.split("/"):
+        if part not in ("*", "**"):
+            chunk(part, "part of a key expression")
+    return text
+
+
 _SUBJECT_TOPICS = {"calibration", "session", "event", "snapshot"}
 _DETAIL_TOPICS = {"skeleton", "truth", "command"}
 
@@ -145,7 +157,7 @@ def parse(key: str) -> Key:
     """
     root, *parts = key.split("/")
     if root != ROOT or len(parts) < 3:
-        raise BadKey(f"key {key!r} is not of the form {ROOT}/<room>/<subject>/<topic>")
+        raise BadKey(f"key {key[:80]!r} is not of the form {ROOT}/<room>/<subject>/<topic>")
     for part in parts:
         chunk(part, "key part")
     room, subject, topic, *rest = parts
