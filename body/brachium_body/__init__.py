@@ -1,1 +1,1 @@
-"""The arm itself: segments, rotations, kinematics, angle conventions, ranges. Only numpy; knows no network."""
+"""The arm itself: segments, rotations, kinematics, angles, ranges. Only numpy; knows no network."""

@@ -15,7 +15,8 @@ IDENTITY: Array = np.array([1.0, 0.0, 0.0, 0.0])
 def normalize(q: npt.ArrayLike) -> Array:
     """Return q over its length, (..., 4). A zero quaternion gives NaN."""
     q = np.asarray(q, dtype=np.float64)
-    return q / np.sqrt(np.einsum("...i,...i->...", q, q))[..., None]
+    unit: Array = q / np.sqrt(np.einsum("...i,...i->...", q, q))[..., None]
+    return unit
 
 
 def multiply(p: npt.ArrayLike, q: npt.ArrayLike) -> Array:
@@ -70,7 +71,8 @@ def to_rotation_vector(q: npt.ArrayLike) -> Array:
 
 def angle_between(p: npt.ArrayLike, q: npt.ArrayLike) -> Array:
     """Return the angle in rad, [0, pi], of the rotation that takes p to q."""
-    return np.linalg.norm(to_rotation_vector(multiply(inverse(p), q)), axis=-1)
+    angle: Array = np.linalg.norm(to_rotation_vector(multiply(inverse(p), q)), axis=-1)
+    return angle
 
 
 def about(axis: int, angle: npt.ArrayLike) -> Array:
@@ -98,8 +100,8 @@ def to_matrix(q: npt.ArrayLike) -> Array:
 def from_matrix(matrix: npt.ArrayLike) -> Array:
     """Return unit quaternions (..., 4), w >= 0, of rotation matrices (..., 3, 3).
 
-    The largest of the four components is taken from the diagonal and the others from it (Shepperd 1978), so no
-    division is by a small number.
+    The largest of the four components is taken from the diagonal and the others from it (Shepperd 1978), so
+    no division is by a small number.
     """
     m = np.asarray(matrix, dtype=np.float64)
     xx, yy, zz = m[..., 0, 0], m[..., 1, 1], m[..., 2, 2]
@@ -137,7 +139,8 @@ def mean(q: npt.ArrayLike) -> Array:
 
 
 def heading(q: npt.ArrayLike) -> Array:
-    """Return the rotation's angle about the vertical z axis in rad: the twist of swing-twist, (..., 4) -> (...)."""
+    """Return the rotation's angle about the vertical z axis in rad: the twist of swing-twist,
+    (..., 4) -> (...)."""
     q = np.asarray(q, dtype=np.float64)
     return wrap(2.0 * np.arctan2(q[..., 3], q[..., 0]))
 
@@ -148,9 +151,10 @@ def wrap(angle: npt.ArrayLike) -> Array:
 
 
 def mirror(q: npt.ArrayLike) -> Array:
-    """Return the rotation seen in a mirror across the sagittal plane of ISB axes: S R S with S = diag(1, 1, -1).
+    """Return the rotation seen in a mirror across the sagittal plane of ISB axes.
 
-    Reversing Z keeps the turn about Z and turns those about X and Y round.
+    That is S R S with S = diag(1, 1, -1): reversing Z keeps the turn about Z and turns
+    those about X and Y round.
     """
     return np.asarray(q, dtype=np.float64) * _MIRROR
 
