@@ -1,4 +1,4 @@
-"""What the router is told, as a value: settings to the JSON5 that Zenoh reads. A zenohd takes the same text."""
+"""What the router is told: settings to the JSON5 that Zenoh reads; a zenohd takes the same text. Pure."""
 
 import ipaddress
 import json

@@ -1,0 +1,68 @@
+"""The command line. Here is only the table of commands: each is a module that is loaded when it is called."""
+
+import sys
+from importlib import import_module
+
+COMMANDS: dict[str, str] = {
+    "demo": "the whole network on this machine: live view, recording, summary",
+    "up": "every service that a site file names, watched and restarted",
+    "router": "the room's Zenoh router",
+    "gateway": "the door for wearables (WebSocket): it assigns nodes to subjects and segments",
+    "emulate": "an emulated wearer, through the gateway or straight to the bus",
+    "play": "a capture folder or a recording, as if it were being measured now",
+    "fuse": "fusion: samples to skeletons",
+    "view": "the live view",
+    "record": "the recorder",
+    "monitor": "the network in the terminal: nodes, rates, loss, latency",
+    "solve": "a capture folder or a recording to angles, positions and orientations",
+    "compare": "error statistics between two results",
+    "doctor": "what works on this machine, what does not, and what to do",
+    "bench": "the performance figures of this machine",
+    "prove": "measure every figure that is promised, into a folder of JSON files",
+}
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Run one command; return 0, 2 for usage and bad input, or 1 when it failed while running."""
+    words = sys.argv[1:] if argv is None else argv
+    if not words or words[0] in ("-h", "--help"):
+        print(_help())
+        return 0
+    if words[0] == "--version":
+        from importlib.metadata import version
+
+        print(f"brachium {version('brachium')}")
+        return 0
+    if words[0] not in COMMANDS:
+        print(_unknown(words[0]), file=sys.stderr)
+        return 2
+    from brachium.shell import run_command
+
+    return run_command(
+        words[0], COMMANDS[words[0]], import_module(f"brachium.commands.{words[0]}"), words[1:]
+    )
+
+
+def _help() -> str:
+    rows = "\n".join(f"  {name:<9}{text}" for name, text in COMMANDS.items())
+    return (
+        "usage: brachium COMMAND [options]\n\n"
+        "Upper-limb motion tracking with small wireless inertial sensors.\n\n"
+        f"commands:\n{rows}\n\n"
+        "first look:    brachium demo\n"
+        "one command:   brachium COMMAND --help\n"
+        "this version:  brachium --version\n\n"
+        "A measuring and research tool, not a medical device."
+    )
+
+
+def _unknown(word: str) -> str:
+    from difflib import get_close_matches
+
+    near = get_close_matches(word, COMMANDS, n=1)
+    hint = f"did you mean {near[0]!r}?" if near else "see: brachium --help"
+    return f"brachium: no command {word!r}; {hint}"
+
+
+if __name__ == "__main__":
+    sys.exit(main())

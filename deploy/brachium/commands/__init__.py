@@ -1,0 +1,1 @@
+"""One module a command; `brachium.__main__` holds their table."""
