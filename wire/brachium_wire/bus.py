@@ -114,9 +114,9 @@ class Inbox:
 class Bus:
     """A client of the room's router. Use it in a `with` block: a session left open keeps the process alive.
 
-    Any thread may call it. Callbacks run on Zenoh's threads, one each; one that blocks holds up every subscription
-    of this bus. Keys and key expressions that are not ours raise keys.BadKey before Zenoh sees them (a key beyond
-    64 kB would break its session for good).
+    Any thread may call it. Callbacks run on Zenoh's threads, one each; one that blocks holds up every
+    subscription of this bus. Keys and key expressions that are not ours raise keys.BadKey before Zenoh sees
+    them: a key beyond 64 kB would break its session for good.
     """
 
     def __init__(self, session: zenoh.Session, endpoint: str) -> None:
@@ -190,13 +190,14 @@ class Bus:
         # No lock while Zenoh declares; of two made at once the second, still unused, goes.
         first = self._publishers.setdefault(key, publisher)
         if first is not publisher:
-            publisher.undeclare()
+            publisher.undeclare()  # type: ignore[no-untyped-call]  # as Zenoh types it
         return first
 
     def retain(self, key: str, payload: bytes) -> None:
         """Publish on a key and answer who asks for it later with the last value, as long as this bus is open.
 
-        Who subscribes, then fetches, and reads what it fetched before what it received, ends with the last value.
+        Who subscribes, then fetches, and reads what it fetched before what it received, ends with the last
+        value.
         """
         keys.parse(key)
         with self._lock:
@@ -235,10 +236,10 @@ class Bus:
         return inbox
 
     def serve(self, key_expression: str, answer: Callable[[str, bytes], bytes]) -> None:
-        """Answer queries on matching keys: `answer(key, question)` runs on Zenoh's thread and returns the bytes.
+        """Answer queries on matching keys with the bytes of `answer(key, question)`, run on Zenoh's thread.
 
-        `key` is always one plain key: a query on a wildcard, which may only look for retained values, is refused
-        here. When `answer` raises, the error is logged and the asker gets an Answer that says so.
+        `key` is always one plain key: a query on a wildcard, which may only look for retained values, is
+        refused here. When `answer` raises, the error is logged and the asker gets an Answer that says so.
         """
 
         def asked(query: zenoh.Query) -> None:
@@ -257,6 +258,33 @@ class Bus:
             query.reply(key, payload)
 
         self._keep(self._session.declare_queryable(keys.expression(key_expression), asked))
+
+    def serve_later(
+        self, key_expression: str, asked: Callable[[str, bytes, Callable[[bytes], None]], None]
+    ) -> None:
+        """Take queries on matching keys and answer them when the answer is there.
+
+        `asked(key, question, reply)` runs on Zenoh's thread and must not block; `reply(answer)` may be called later,
+        once, from any thread. The asker sets how long it waits.
+        """
+
+        def heard(query: zenoh.Query) -> None:
+            key = str(query.key_expr)
+            if "*" in key:
+                query.reply_err(f"{key}: one key at a time is answered here")
+                return
+            question = query.payload
+
+            def reply(answer: bytes) -> None:
+                try:
+                    query.reply(key, answer)
+                    query.drop()
+                except zenoh.ZError as error:
+                    log.debug("nobody waits for the answer on %s any more: %s", key, error)
+
+            asked(key, b"" if question is None else question.to_bytes(), reply)
+
+        self._keep(self._session.declare_queryable(keys.expression(key_expression), heard))
 
     def ask(self, key: str, question: bytes = b"", timeout_s: float = 2.0) -> bytes | None:
         """Return the first answer to a query, or None when nobody answers in time."""
@@ -279,7 +307,7 @@ class Bus:
                 held = any(kept is token for kept in self._kept)
                 self._kept = [kept for kept in self._kept if kept is not token]
             if held and not self._closed:
-                token.undeclare()
+                token.undeclare()  # type: ignore[no-untyped-call]  # as Zenoh types it
 
         return end
 
@@ -307,7 +335,7 @@ class Bus:
         """
         self._closed = True
         try:
-            self._session.close()
+            self._session.close()  # type: ignore[no-untyped-call]  # as Zenoh types it
         except zenoh.ZError as error:
             log.debug("closing the session: %s", error)
 

@@ -13,7 +13,7 @@ BEAT_S = 1.0
 
 
 class Heart:
-    """One service's sign of life. Count into `counts` and `drops`, call `beat` often; it publishes once a second."""
+    """One service's sign of life. Count into `counts` and `drops`, call `beat` often: it puts at 1 Hz."""
 
     def __init__(self, bus: Bus, room: str, kind: str, service_id: str) -> None:
         self._bus, self._key = bus, keys.service(room, kind, service_id)

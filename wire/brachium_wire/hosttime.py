@@ -1,4 +1,4 @@
-"""Host time: the wall clock read once at start, plus the monotonic clock since. Wall-clock jumps change nothing."""
+"""Host time: the wall clock read once at start, plus the monotonic clock since. Its jumps change nothing."""
 
 import time
 

@@ -26,7 +26,7 @@ def chunk(name: str, what: str = "name") -> str:
     """Return `name` if it may stand in a key, or raise BadKey saying what may."""
     if not isinstance(name, str) or not _CHUNK.match(name):
         raise BadKey(
-            f"{what} {str(name)[:80]!r} cannot be used: write 1 to 64 of A-Z a-z 0-9 _ - and, not first, a dot"
+            f"{what} {str(name)[:80]!r} cannot be used: write 1 to 64 of A-Z a-z 0-9 _ - and, not first, ."
         )
     return name
 
@@ -104,7 +104,8 @@ def commands(room: str, verb: str) -> str:
 
 def service(room: str, kind: str, service_id: str) -> str:
     """Return the key of a service's health."""
-    return f"{ROOT}/{chunk(room, 'room')}/{SERVICE}/{chunk(kind, 'service kind')}/{chunk(service_id, 'service id')}"
+    place = f"{ROOT}/{chunk(room, 'room')}/{SERVICE}"
+    return f"{place}/{chunk(kind, 'service kind')}/{chunk(service_id, 'service id')}"
 
 
 def alive(room: str, kind: str, service_id: str) -> str:
@@ -134,7 +135,7 @@ def services(room: str, tail: str = "*/*") -> str:
 
 
 def expression(text: str) -> str:
-    """Return `text` if every chunk of it may stand in a key or is the wildcard `*` or `**`, or raise BadKey."""
+    """Return `text` if each chunk of it may stand in a key or is a wildcard, `*` or `**`; or raise BadKey."""
     if not isinstance(text, str) or len(text) > 1024:
         raise BadKey(
             f"key expression {str(text)[:80]!r} cannot be used: expected text of at most 1024 characters"
@@ -153,7 +154,7 @@ _DETAIL_TOPICS = {"skeleton", "truth", "command"}
 def parse(key: str) -> Key:
     """Return the parts of a key, or raise BadKey if it is not one of ours.
 
-    A key received may hold wildcards (Zenoh delivers a put on a wildcard under that name): they are refused here.
+    A key received may hold wildcards (Zenoh delivers a put on a wildcard under that name): they are refused.
     """
     root, *parts = key.split("/")
     if root != ROOT or len(parts) < 3:

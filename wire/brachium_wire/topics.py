@@ -22,9 +22,9 @@ class Topic:
     pattern: str
     """Key below brachium/<room>/, for people; keys.py builds and reads them."""
     message: type[m.Message]
-    rate_hz: float | None
+    rate_hz: float | None = None
     """Nominal messages a second on one key; None when it comes as it comes."""
-    stale_after_s: float | None
+    stale_after_s: float | None = None
     """Older than this, a value is shown as stale."""
     urgency: Urgency = Urgency.DATA
     retained: bool = False
@@ -38,17 +38,61 @@ class Topic:
 TOPICS: dict[str, Topic] = {
     t.name: t
     for t in (
-        Topic(name="imu", pattern="<subject>/imu/<segment>", message=m.SampleBatch, rate_hz=20.0, stale_after_s=0.5),
-        Topic(name="info", pattern="<subject>/imu/<segment>/info", message=m.Info, rate_hz=None, stale_after_s=None, retained=True),
-        Topic(name="status", pattern="<subject>/imu/<segment>/status", message=m.Status, rate_hz=1.0, stale_after_s=3.0),
-        Topic(name="skeleton", pattern="<subject>/skeleton/<side>", message=m.Skeleton, rate_hz=50.0, stale_after_s=0.5),
-        Topic(name="calibration", pattern="<subject>/calibration", message=m.Calibration, rate_hz=None, stale_after_s=None, retained=True, max_bytes=65536),
-        Topic(name="session", pattern="<subject>/session", message=m.Session, rate_hz=None, stale_after_s=None, retained=True, max_bytes=65536),
-        Topic(name="event", pattern="<subject>/event", message=m.Event, rate_hz=None, stale_after_s=None, max_bytes=65536),
-        Topic(name="command", pattern="<subject>/command/<verb>", message=m.Command, rate_hz=None, stale_after_s=None, urgency=Urgency.CONTROL, recorded=False, max_bytes=65536),
-        Topic(name="truth", pattern="<subject>/truth/<side>", message=m.Skeleton, rate_hz=50.0, stale_after_s=0.5),
+        Topic(
+            name="imu",
+            pattern="<subject>/imu/<segment>",
+            message=m.SampleBatch,
+            rate_hz=20.0,
+            stale_after_s=0.5,
+        ),
+        Topic(name="info", pattern="<subject>/imu/<segment>/info", message=m.Info, retained=True),
+        Topic(
+            name="status",
+            pattern="<subject>/imu/<segment>/status",
+            message=m.Status,
+            rate_hz=1.0,
+            stale_after_s=3.0,
+        ),
+        Topic(
+            name="skeleton",
+            pattern="<subject>/skeleton/<side>",
+            message=m.Skeleton,
+            rate_hz=50.0,
+            stale_after_s=0.5,
+        ),
+        Topic(
+            name="calibration",
+            pattern="<subject>/calibration",
+            message=m.Calibration,
+            retained=True,
+            max_bytes=65536,
+        ),
+        Topic(name="session", pattern="<subject>/session", message=m.Session, retained=True, max_bytes=65536),
+        Topic(name="event", pattern="<subject>/event", message=m.Event, max_bytes=65536),
+        Topic(
+            name="command",
+            pattern="<subject>/command/<verb>",
+            message=m.Command,
+            urgency=Urgency.CONTROL,
+            recorded=False,
+            max_bytes=65536,
+        ),
+        Topic(
+            name="truth",
+            pattern="<subject>/truth/<side>",
+            message=m.Skeleton,
+            rate_hz=50.0,
+            stale_after_s=0.5,
+        ),
         # Kept in recordings only: it is the answer to the command `record`, and never put on the bus.
-        Topic(name="snapshot", pattern="<subject>/snapshot", message=m.Snapshot, rate_hz=None, stale_after_s=None, max_bytes=1 << 20),
-        Topic(name="health", pattern="service/<kind>/<id>", message=m.Health, rate_hz=1.0, stale_after_s=3.0, max_bytes=65536),
+        Topic(name="snapshot", pattern="<subject>/snapshot", message=m.Snapshot, max_bytes=1 << 20),
+        Topic(
+            name="health",
+            pattern="service/<kind>/<id>",
+            message=m.Health,
+            rate_hz=1.0,
+            stale_after_s=3.0,
+            max_bytes=65536,
+        ),
     )
 }
