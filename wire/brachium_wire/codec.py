@@ -27,6 +27,7 @@ class Drop(Enum):
     NO_INFO = "no_info"
     TIME_BACKWARDS = "time_backwards"
     OUT_OF_ORDER = "out_of_order"
+    REPEATED = "repeated"
     LATE = "late"
     SECOND_HOST = "second_host"
     SECOND_NODE = "second_node"

@@ -1,0 +1,69 @@
+"""A node's batch to the bus's: steps to SI, every number checked once, times left to the clock."""
+
+from dataclasses import dataclass
+from operator import lt
+from struct import unpack
+
+import numpy as np
+from brachium_wire.codec import Drop, WireError
+from brachium_wire.messages import SampleBatch, Vector
+from brachium_wire.samples import read_samples
+
+from brachium_nodes.clock import Integers
+from brachium_nodes.node_frames import MAX_FRAME_SAMPLES, MAX_SPAN_US, Batch, Hello
+
+MAX_SEQUENCE = 1 << 48
+MAX_DEVICE_US = 1 << 50
+"""35 years: a clock beyond that is not a clock."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Measured:
+    """A checked batch. `batch` has every field but host times, which only the clock can give."""
+
+    batch: SampleBatch
+    device_us: Integers
+
+    def __len__(self) -> int:
+        return len(self.device_us)
+
+
+def measure(frame: Batch, hello: Hello) -> Measured:
+    """Return what a batch of this node holds, in SI, or raise WireError."""
+    if not 0 <= frame.sequence < MAX_SEQUENCE or not 0 <= frame.device_us < MAX_DEVICE_US:
+        raise WireError(Drop.OUT_OF_RANGE, "batch/1: seq and t must be positive, below 2^48 and 2^50")
+    n, tail = divmod(len(frame.offsets), 4)
+    if tail or not 1 <= n <= MAX_FRAME_SAMPLES:
+        raise WireError(
+            Drop.WRONG_SHAPE, f"batch/1: dt of {len(frame.offsets)} bytes; 1 to {MAX_FRAME_SAMPLES} u32 are taken"
+        )
+    offsets = unpack(f"<{n}I", frame.offsets)
+    if offsets[0] != 0 or offsets[-1] > MAX_SPAN_US or not all(map(lt, offsets, offsets[1:])):
+        raise WireError(Drop.TIME_BACKWARDS, "batch/1: dt must begin with 0, grow, and end within 4 s")
+    scales = hello.scales
+    batch = SampleBatch(
+        sequence=frame.sequence,
+        time_ns=1,
+        offsets=frame.offsets,
+        device_us=frame.device_us,
+        device_offsets=frame.offsets,
+        received_ns=1,
+        uncertainty_ns=0,
+        acc=_si(frame.acc, scales.acc, hello.big_endian),
+        gyr=_si(frame.gyr, scales.gyr, hello.big_endian),
+        mag=_si(frame.mag, scales.mag, hello.big_endian),
+        mag_index=frame.mag_index,
+        quat=frame.quat,
+        late=frame.late,
+    )
+    read_samples(batch)  # the one check of shapes, finiteness and ranges
+    return Measured(batch, np.array(offsets, dtype=np.int64) + frame.device_us)
+
+
+def _si(block: bytes | None, scale: Vector | None, big_endian: bool) -> bytes | None:
+    if block is None or scale is None:
+        return block
+    if len(block) % 6:
+        raise WireError(Drop.WRONG_SHAPE, f"batch/1: a block of {len(block)} bytes does not hold triples of i16")
+    steps = np.frombuffer(block, dtype=">i2" if big_endian else "<i2").reshape(-1, 3)
+    return (steps * np.array(scale)).astype("<f4").tobytes()

@@ -1,0 +1,279 @@
+"""One connection of one node, without a socket: what came and when goes in, what is to be done comes out."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Literal
+
+import msgspec
+import numpy as np
+from brachium_wire.codec import Drop, WireError, encode
+from brachium_wire.messages import Info, Message, SampleBatch, Status
+
+from brachium_nodes import node_frames as f
+from brachium_nodes.batch_blocks import Measured, measure
+from brachium_nodes.roster import Admission, Refusal
+
+HELLO_WITHIN_NS = 3_000_000_000
+STATUS_NS = 1_000_000_000
+ASK_NS, ASK_OFTEN_NS = 250_000_000, 125_000_000
+"""Between two clock questions; the shorter one for the first seconds."""
+ASK_OFTEN_FOR_NS = 3_000_000_000
+MAX_ASKED = 32
+"""Questions without an answer that are remembered."""
+HOLD_NS = 1_000_000_000
+"""So long, batches wait for the first clock answer; then arrivals alone must tell the time."""
+MAX_HELD = 256
+MAX_AHEAD_NS = 1_000_000_000
+"""A sample this far in the future has a broken clock."""
+
+
+@dataclass(frozen=True, slots=True)
+class Send:
+    """Send this frame to the node."""
+
+    frame: bytes
+
+
+@dataclass(frozen=True, slots=True)
+class Close:
+    """Close the connection."""
+
+    code: int
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class Publish:
+    """Put this on the bus, on the key of the node's segment. Info is retained."""
+
+    topic: Literal["info", "imu", "status"]
+    message: Message
+
+
+Action = Send | Close | Publish
+Admit = Callable[[f.Hello], Admission | Refusal]
+
+
+class Conversation:
+    """The state of one connection. `admit` decides over a hello; `host` names the clock that host time is."""
+
+    def __init__(self, admit: Admit, host: str, now_ns: int) -> None:
+        self._admit, self._host, self._since_ns = admit, host, now_ns
+        self.hello: f.Hello | None = None
+        self.admission: Admission | None = None
+        self.closed = False
+        self._said: f.NodeStatus = f.NodeStatus()
+        self._asked: dict[int, int] = {}
+        self._next_id = 0
+        self._ask_ns = self._status_ns = now_ns
+        self._counted_ns, self._counted = now_ns, 0
+        self._held: list[tuple[Measured, int]] = []
+
+    def receive(self, payload: bytes | str, now_ns: int) -> list[Action]:
+        """Take a WebSocket message that came at host time `now_ns`."""
+        if self.closed:
+            return []
+        try:
+            frame = f.from_node(payload)
+        except WireError as error:
+            if self.admission is None:
+                return self._refuse(Refusal("bad_hello", f"the first frame must be hello/1: {error}"))
+            self._drop(error)
+            return []
+        if self.admission is None or isinstance(frame, f.Hello):
+            return self._greet(frame, now_ns)
+        try:
+            return self._take(frame, now_ns)
+        except WireError as error:
+            self._drop(error)
+            return []
+
+    def tick(self, now_ns: int) -> list[Action]:
+        """Do what time asks for: clock questions, status, the end of patience. Call it at least each 50 ms."""
+        if self.closed:
+            return []
+        if self.admission is None:
+            if now_ns - self._since_ns > HELLO_WITHIN_NS:
+                return self._close(f.CLOSE_NO_HELLO, "no hello within 3 s")
+            return []
+        actions: list[Action] = []
+        if now_ns >= self._ask_ns:
+            actions.append(self._ask(now_ns))
+        if self._held and now_ns - self._held[0][1] > HOLD_NS:
+            actions += self._release()
+        if now_ns >= self._status_ns:
+            self._status_ns = now_ns + STATUS_NS
+            actions.append(Publish("status", self.status(now_ns, connected=True)))
+        return actions
+
+    def lost(self, now_ns: int, *, oversize: bool = False) -> list[Action]:
+        """Take that the connection is gone: publish what is left and a last status."""
+        if self.admission is None:
+            return []
+        if oversize:
+            self.admission.memory.drops[Drop.OVERSIZE.value] += 1
+        self.closed = True
+        return [*self._release(), Publish("status", self.status(now_ns, connected=False))]
+
+    def expel(self, refusal: Refusal) -> list[Action]:
+        """End the connection from this side, telling the node why."""
+        return [] if self.closed else self._refuse(refusal)
+
+    def status(self, now_ns: int, *, connected: bool) -> Status:
+        """Return how the node fares."""
+        assert self.admission is not None
+        assert self.hello is not None
+        memory, said = self.admission.memory, self._said
+        elapsed = now_ns - self._counted_ns
+        rate = (memory.counter.received - self._counted) / (elapsed * 1e-9) if elapsed > STATUS_NS // 2 else None
+        self._counted_ns, self._counted = now_ns, memory.counter.received
+        clock = memory.clock
+        return Status(
+            node=self.hello.node,
+            time_ns=now_ns,
+            connected=connected,
+            received=memory.counter.received,
+            lost=memory.counter.lost,
+            out_of_order=memory.counter.out_of_order,
+            late=memory.late,
+            rate_hz=rate,
+            battery_v=said.battery_v,
+            battery_hours=said.battery_hours,
+            rssi_dbm=said.rssi_dbm,
+            node_dropped=said.dropped,
+            clock_offset_ns=clock.offset_ns if clock.known else None,
+            clock_skew_ppm=clock.skew_ppm if clock.known else None,
+            clock_uncertainty_ns=clock.uncertainty_ns(clock.newest_us) if clock.known else None,
+            drops=dict(memory.drops),
+        )
+
+    def _greet(self, frame: f.NodeFrame, now_ns: int) -> list[Action]:
+        if not isinstance(frame, f.Hello) or self.admission is not None:
+            expected = "hello/1 comes once" if self.admission is not None else "the first frame must be hello/1"
+            return self._refuse(Refusal("bad_hello", expected))
+        answer = self._admit(frame)
+        if isinstance(answer, Refusal):
+            return self._refuse(answer)
+        self.hello, self.admission = frame, answer
+        self._since_ns = self._counted_ns = now_ns
+        self._counted = answer.memory.counter.received
+        self._status_ns = now_ns + STATUS_NS
+        welcome = f.Welcome(subject=answer.subject, segment=answer.segment, host=self._host, time_ns=now_ns)
+        info = Info(
+            node=frame.node,
+            rate_hz=frame.rate_hz,
+            origin=frame.origin,
+            host=self._host,
+            chip=frame.chip,
+            firmware=frame.firmware,
+            mounting=answer.entry.mounting,
+            calibration=frame.calibration,
+            magnetometer=frame.magnetometer,
+            orientation_only=frame.orientation_only,
+        )
+        return [Publish("info", info), Send(encode(welcome)), self._ask(now_ns)]
+
+    def _take(self, frame: f.NodeFrame, now_ns: int) -> list[Action]:
+        assert self.admission is not None
+        assert self.hello is not None
+        if isinstance(frame, f.Batch):
+            return self._batch(measure(frame, self.hello), now_ns)
+        if isinstance(frame, f.ClockAnswer):
+            return self._answer(frame, now_ns)
+        if isinstance(frame, f.NodeStatus):
+            self._said = frame
+            return []
+        assert isinstance(frame, f.Bye)
+        self.admission.memory.counter.end(frame.next_sequence)
+        return [*self._release(), *self._close(1000, "bye")]
+
+    def _batch(self, measured: Measured, now_ns: int) -> list[Action]:
+        assert self.admission is not None
+        memory = self.admission.memory
+        if not memory.clock.known and len(self._held) < MAX_HELD and now_ns - self._since_ns < HOLD_NS:
+            self._held.append((measured, now_ns))
+            return []
+        return [*self._release(), *self._publish(measured, now_ns)]
+
+    def _release(self) -> list[Action]:
+        held, self._held = self._held, []
+        actions: list[Action] = []
+        for measured, received_ns in held:
+            try:
+                actions += self._publish(measured, received_ns)
+            except WireError as error:
+                self._drop(error)
+        return actions
+
+    def _publish(self, measured: Measured, received_ns: int) -> list[Action]:
+        assert self.admission is not None
+        memory, place = self.admission.memory, self.admission.place
+        batch, clock = measured.batch, memory.clock
+        expected = memory.counter.next
+        in_order = not batch.late and (expected is None or batch.sequence >= expected)
+        if in_order and measured.device_us[0] <= memory.newest_us:
+            raise WireError(Drop.TIME_BACKWARDS, f"batch/1: t {batch.device_us} is not after the sample before")
+        newest_us = int(measured.device_us[-1])
+        if not clock.known:
+            clock.arrival(newest_us, received_ns)
+        times = clock.host_ns(measured.device_us, keep=in_order)
+        if times[0] <= 0 or times[-1] > received_ns + clock.uncertainty_ns(newest_us) + MAX_AHEAD_NS:
+            raise WireError(Drop.OUT_OF_RANGE, f"batch/1: t {batch.device_us} lies in the future")
+        clock.arrival(newest_us, received_ns)
+        repeated = memory.counter.repeated
+        memory.counter.feed(batch.sequence, len(measured))
+        again = memory.counter.repeated - repeated
+        memory.drops.update({Drop.REPEATED.value: again} if again else {})
+        if again == len(measured):
+            return []
+        if batch.late:
+            memory.late += len(measured)
+        if memory.base is None:
+            memory.base = max(0, place.next_sequence - batch.sequence)
+        sequence = batch.sequence + memory.base
+        if in_order:
+            memory.newest_us = newest_us
+            times = times + max(0, place.newest_ns + 1 - int(times[0]))  # another node or boot was here before
+            place.newest_ns, place.next_sequence = int(times[-1]), sequence + len(measured)
+        shared: SampleBatch = msgspec.structs.replace(
+            batch,
+            sequence=sequence,
+            time_ns=int(times[0]),
+            offsets=(times - times[0]).astype("<u4").tobytes(),
+            received_ns=received_ns,
+            uncertainty_ns=clock.uncertainty_ns(newest_us),
+        )
+        return [Publish("imu", shared)]
+
+    def _ask(self, now_ns: int) -> Send:
+        often = now_ns - self._since_ns < ASK_OFTEN_FOR_NS
+        self._ask_ns = now_ns + (ASK_OFTEN_NS if often else ASK_NS)
+        self._next_id = (self._next_id + 1) & 0xFFFF
+        self._asked[self._next_id] = now_ns
+        while len(self._asked) > MAX_ASKED:
+            del self._asked[next(iter(self._asked))]
+        return Send(encode(f.ClockAsk(id=self._next_id)))
+
+    def _answer(self, frame: f.ClockAnswer, now_ns: int) -> list[Action]:
+        assert self.admission is not None
+        asked_ns = self._asked.pop(frame.id, None)
+        fits = 0 <= frame.came_us <= frame.left_us < 1 << 50
+        if (
+            asked_ns is None
+            or not fits
+            or not self.admission.memory.clock.exchange(asked_ns, frame.came_us, frame.left_us, now_ns)
+        ):
+            raise WireError(Drop.OUT_OF_RANGE, "clock/1: id, t1 and t2 do not fit a question that was asked")
+        return self._release()
+
+    def _drop(self, error: WireError) -> None:
+        assert self.admission is not None
+        self.admission.memory.drops[error.drop.value] += 1
+
+    def _refuse(self, refusal: Refusal) -> list[Action]:
+        frame = f.Refused(code=refusal.code, reason=refusal.reason, retry_s=refusal.retry_s)
+        return [Send(encode(frame)), *self._close(f.CLOSE_CODES[refusal.code], refusal.reason)]
+
+    def _close(self, code: int, reason: str) -> list[Action]:
+        self.closed = True
+        return [Close(code, reason.encode()[:120].decode(errors="ignore"))]  # RFC 6455 5.5: at most 123 bytes
