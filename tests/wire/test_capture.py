@@ -1,0 +1,227 @@
+"""Capture folders: what is written is read back; what is wrong is named in one line."""
+
+import os
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from brachium_body.segments import SEGMENTS
+from brachium_wire import capture, table
+from brachium_wire.capture import Capture, CaptureSegment
+from brachium_wire.capture_settings import CalibrationSpans, CaptureError, CaptureSettings, Functional, Joint
+from brachium_wire.messages import SensorCalibration
+
+DATA = Path(os.environ.get("BRACHIUM_DATA", Path(__file__).parents[2].parent / "shared" / "data"))
+HEAD = "t,ax,ay,az,gx,gy,gz\n"
+ROWS = "0.00,0,0,9.81,0,0,0\n0.01,0,0,9.81,0,0,0.5\n0.02,0,0,9.81,0,0,0\n"
+FULL = CaptureSettings(
+    title='a "quoted" title \x7f ü',
+    side="left",
+    rate_hz=100.0,
+    lengths_m={"upper_arm": 0.33, "hand": 0.19},
+    facing_deg=90.0,
+    mounting={"forearm_l": (0.0, 1.0, 0.0, 0.0)},
+    sensor={"forearm_l": SensorCalibration(gyro_bias=(0.01, 0.0, -0.01))},
+    calibration=CalibrationSpans(
+        pose="given",
+        from_s=0.5,
+        to_s=3.0,
+        angles_deg={"elbow_flexion": 35.0},
+        functional=(Functional(motion="elbow-flexion", from_s=5.0, to_s=15.0),),
+    ),
+    joint={"elbow": Joint(axes=2, centre_from={"upper_arm_l": (0.0, -0.14, 0.0)})},
+)
+
+
+def folder(
+    tmp_path: Path, text: str = HEAD + ROWS, toml: str | None = None, name: str = "forearm_r.csv"
+) -> Path:
+    path = tmp_path / "capture"
+    path.mkdir()
+    (path / name).write_text(text)
+    if toml is not None:
+        (path / "capture.toml").write_text(toml)
+    return path
+
+
+def same(a: Capture, segments: dict[Any, CaptureSegment]) -> None:
+    assert list(a.segments) == [name for name in SEGMENTS if name in segments]
+    for name, segment in segments.items():
+        for block in ("t", "acc", "gyr", "mag", "quat"):
+            mine, theirs = getattr(a.segments[name], block), getattr(segment, block)
+            assert (mine is None) == (theirs is None)
+            if mine is not None:
+                np.testing.assert_allclose(mine, theirs, rtol=0, atol=1e-15)
+
+
+@pytest.mark.parametrize("ending", ["csv", "parquet"])
+@given(seed=st.integers(0, 2**32 - 1), n=st.integers(2, 30))
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=20, deadline=None)
+def test_a_capture_comes_back(
+    tmp_path_factory: Any, ending: Literal["csv", "parquet"], seed: int, n: int
+) -> None:
+    random = np.random.default_rng(seed)
+    t = 40.0 + np.cumsum(random.uniform(0.001, 0.1, n))
+    mag = random.normal(size=(n, 3))
+    mag[random.random(n) < 0.3] = np.nan
+    quat = random.normal(size=(n, 4))
+    segments: dict[Any, CaptureSegment] = {
+        "hand_l": CaptureSegment(t=t, rate_hz=1.0, quat=quat / np.linalg.norm(quat, axis=1, keepdims=True)),
+        "forearm_l": CaptureSegment(
+            t=t + 0.3, rate_hz=1.0, acc=random.normal(size=(n, 3)), gyr=random.normal(size=(n, 3)), mag=mag
+        ),
+    }
+    path = tmp_path_factory.mktemp("c") / "capture"
+    capture.write(path, FULL, segments, ending)
+    read = capture.load(path)
+    same(read, segments)
+    assert read.settings == FULL
+    assert read.truth is None
+
+
+def test_a_folder_of_one_csv_file_is_a_capture(tmp_path: Path) -> None:
+    read = capture.load(folder(tmp_path))
+    assert read.settings == CaptureSettings()
+    assert read.warnings == ()
+    segment = read.segments["forearm_r"]
+    assert segment.rate_hz == pytest.approx(100.0)
+    assert segment.mag is segment.quat is None
+    assert segment.gyr is not None
+    assert segment.gyr[1].tolist() == [0.0, 0.0, 0.5]
+
+
+def test_rows_with_a_missing_number_are_left_out_counted_and_said(tmp_path: Path) -> None:
+    text = HEAD + "0.00,0,0,9.81,0,0,0\n0.01,,0,9.81,0,0,0\n0.02,0,0,9.81,0,nan,0\n0.07,0,0,9.81,0,0,0\n"
+    read = capture.load(folder(tmp_path, text))
+    segment = read.segments["forearm_r"]
+    assert segment.t.tolist() == [0.0, 0.07]  # the gap stays a gap
+    assert segment.dropped == 2
+    assert read.warnings == ("forearm_r: 2 rows left out, because a number is missing in them",)
+
+
+def test_a_slow_magnetometer_leaves_the_other_numbers(tmp_path: Path) -> None:
+    text = "t,ax,ay,az,gx,gy,gz,mx,my,mz\n0,0,0,9.8,0,0,0,1,2,3\n1,0,0,9.8,0,0,0,,,\n"
+    segment = capture.load(folder(tmp_path, text)).segments["forearm_r"]
+    assert len(segment.t) == 2
+    assert segment.mag is not None
+    assert np.isnan(segment.mag).all(axis=1).tolist() == [False, True]
+
+
+def test_the_nominal_rate_is_the_files_only_where_it_fits(tmp_path: Path) -> None:
+    path = folder(tmp_path, toml="rate_hz = 101.0")
+    (path / "hand_r.csv").write_text(HEAD + ROWS.replace("0.02", "0.05").replace("0.01", "0.025"))
+    read = capture.load(path)
+    assert read.segments["forearm_r"].rate_hz == 101.0
+    assert read.segments["hand_r"].rate_hz == pytest.approx(40.0)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("x,y\n0,1\n", "column t"),
+        ("t,ax,ay,az,gx,gy\n0,0,0,9,0,0\n", "column gz is missing"),
+        ("t,ax,ay,az\n0,0,0,9\n", "expected ax ay az and gx gy gz"),
+        ("t,ax,ay,az,qw,qx,qy,qz\n0,0,0,9,1,0,0,0\n", "belong together"),
+        ("t,mx,my,mz\n0,0,0,9\n", "expected ax ay az"),
+        (HEAD + "0,0,0,9.8,0,0,0\n", "1 whole rows"),
+        (HEAD, "0 whole rows"),
+        (HEAD + ROWS + "0.02,0,0,9.8,0,0,0\n", "data row 4 has 0.020000 after 0.020000"),
+        (HEAD + "0,0,0,9.8,0,0,oops\n", "column gz holds text"),
+        ("t,qw,qx,qy,qz\n0,1,0,0,0\n1,0,0,0,0\n", "length 0.000"),
+    ],
+)
+def test_a_wrong_segment_file_is_named_in_one_line(tmp_path: Path, text: str, said: str) -> None:
+    with pytest.raises(CaptureError, match=said) as caught:
+        capture.load(folder(tmp_path, text))
+    assert "forearm_r.csv" in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("toml", "said"),
+    [
+        ("side = 'up'", "side"),
+        ("heigth_m = 1.8", "'heigth_m'; did you mean 'height_m'"),
+        ("height_m = -1", "positive"),
+        ("height_m = 'tall'", "height_m"),
+        ("[mounting]\nforarm_r = [1,0,0,0]", "did you mean 'forearm_r'"),
+        ("[mounting]\nforearm_r = [1,1,0,0]", "no rotation"),
+        ("[mounting]\nforearm_r = [1,0,0]", "mounting"),
+        ("[sensor.forearm_r]\ngyro_bais = [0,0,0]", "did you mean 'gyro_bias'"),
+        ("[calibration]\npose = 'n-pose'", "to_s"),
+        ("[calibration]\npose = 'lotus'\nto_s = 3", "pose"),
+        ("[calibration]\nfrom_s = 4\nto_s = 3", "must come after"),
+        ("[calibration]\nform_s = 4", "calibration: unknown entry 'form_s'; did you mean 'from_s'"),
+        ("[[calibration.functional]]\nmotion = 'free'\nfrom_s = 4\nto_s = 4", "functional"),
+        ("[joint.elbow]\naxes = 4", "1, 2 or 3"),
+        ("[joint.elbow]\naxes = 2\nfrom_forearm = [0,0,0]", "did you mean 'from_forearm_r'"),
+        ("[joint.knee]\naxes = 2", "joint"),
+        ("side = ", "not TOML"),
+    ],
+)
+def test_a_wrong_entry_is_named_in_one_line(tmp_path: Path, toml: str, said: str) -> None:
+    with pytest.raises(CaptureError, match=said) as caught:
+        capture.load(folder(tmp_path, toml=toml))
+    assert "capture.toml" in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_misspelt_segment_is_named_with_the_nearest(tmp_path: Path) -> None:
+    with pytest.raises(CaptureError, match="'fore_arm_r'; did you mean 'forearm_r'"):
+        capture.load(folder(tmp_path, name="fore_arm_r.csv"))
+
+
+def test_a_folder_without_segments_says_what_it_wants(tmp_path: Path) -> None:
+    with pytest.raises(CaptureError, match="no segment file; write <segment>"):
+        capture.load(folder(tmp_path, name="imu1.csv"))
+    with pytest.raises(CaptureError, match="no such folder"):
+        capture.load(tmp_path / "nowhere")
+
+
+def test_other_tables_beside_the_segments_are_left_aside_and_said(tmp_path: Path) -> None:
+    path = folder(tmp_path)
+    (path / "angles.csv").write_text("time,x\n0,1\n")
+    (path / "truth.csv").write_text("t,x\n0,1\n")
+    read = capture.load(path)
+    assert list(read.segments) == ["forearm_r"]
+    assert read.warnings == ("angles.csv is no segment and was left aside",)
+    assert read.truth == path / "truth.csv"
+
+
+def test_one_segment_in_two_files_is_refused(tmp_path: Path) -> None:
+    path = folder(tmp_path)
+    table.write(path / "forearm_r.parquet", {"t": [0.0]}, {}, {})
+    with pytest.raises(CaptureError, match=r"forearm_r\.csv and forearm_r\.parquet"):
+        capture.load(path)
+
+
+def test_other_units_are_doubted_aloud(tmp_path: Path) -> None:
+    text = HEAD + "0.00,0,0,1.0,0,0,0\n0.01,0,0,1.0,250,0,0\n"
+    assert [w.split(":")[1][:20] for w in capture.load(folder(tmp_path, text)).warnings] == [
+        " half of all acceler",
+        " angular rates above",
+    ]
+
+
+def test_an_existing_capture_is_not_written_over(tmp_path: Path) -> None:
+    path = folder(tmp_path)
+    with pytest.raises(CaptureError, match="not empty"):
+        capture.write(path, CaptureSettings(), {})
+
+
+@pytest.mark.data
+@pytest.mark.skipif(not DATA.is_dir(), reason=f"no recordings at {DATA}; set BRACHIUM_DATA")
+def test_the_real_recordings_are_captures() -> None:
+    counts = {}
+    for path in sorted(DATA.iterdir()):
+        if path.is_dir():
+            read = capture.load(path)
+            counts[path.name] = len(read.segments)
+            assert read.warnings == ()
+            assert (read.truth is None) == (path.name == "human_arms")
+    assert counts
+    assert set(counts.values()) <= {1, 2, 7}

@@ -1,0 +1,1 @@
+"""Live views, recorder, monitor, summaries: everything that looks at the network and sends nothing back."""

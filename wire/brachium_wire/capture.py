@@ -1,0 +1,208 @@
+"""Capture folders: one `<segment>.parquet` or `<segment>.csv` each, and an optional `capture.toml`.
+
+Columns: `t` s, `ax ay az` m/s^2, `gx gy gz` rad/s, optional `mx my mz` uT; or `qw qx qy qz`, world from
+sensor.
+"""
+
+import difflib
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from brachium_body.segments import SEGMENTS, Segment
+from brachium_wire import table
+from brachium_wire.capture_settings import CaptureError, CaptureSettings, read_settings, to_toml
+
+Floats = npt.NDArray[np.float64]
+
+_BLOCKS = {
+    "acc": ("ax", "ay", "az"),
+    "gyr": ("gx", "gy", "gz"),
+    "mag": ("mx", "my", "mz"),
+    "quat": ("qw", "qx", "qy", "qz"),
+}
+_SETTINGS, _TRUTH = "capture.toml", "truth"
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class CaptureSegment:
+    """One sensor's samples: t (n,) s, strictly growing; acc, gyr, mag (n, 3); quat (n, 4) of length 1."""
+
+    t: Floats
+    rate_hz: float
+    """That of capture.toml when this sensor's median period is within 2 % of it, else the median's."""
+    acc: Floats | None = None
+    gyr: Floats | None = None
+    mag: Floats | None = None
+    """A row of NaN where the magnetometer gave none."""
+    quat: Floats | None = None
+    dropped: int = 0
+    """Rows left out because a number in them was missing."""
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Capture:
+    """A capture folder, read and checked."""
+
+    settings: CaptureSettings
+    segments: dict[Segment, CaptureSegment]
+    truth: Path | None = None
+    """truth.parquet or truth.csv, when there is one."""
+    warnings: tuple[str, ...] = field(default=())
+
+
+def load(folder: Path) -> Capture:
+    """Return what a capture folder holds.
+
+    Raises CaptureError, or table.MissingExtra for Parquet without pyarrow.
+    """
+    if not folder.is_dir():
+        raise CaptureError(f"{folder}: no such folder; a capture is a folder with one file a segment")
+    settings = read_settings(folder / _SETTINGS) if (folder / _SETTINGS).is_file() else CaptureSettings()
+    files, truth, warnings = _files(folder)
+    segments: dict[Segment, CaptureSegment] = {
+        name: _segment(path, settings.rate_hz) for name, path in files.items()
+    }
+    for name, segment in segments.items():
+        warnings += _doubts(name, segment)
+    return Capture(settings=settings, segments=segments, truth=truth, warnings=tuple(warnings))
+
+
+def write(
+    folder: Path,
+    settings: CaptureSettings,
+    segments: Mapping[Segment, CaptureSegment],
+    ending: Literal["csv", "parquet"] = "parquet",
+) -> None:
+    """Write a capture folder; raises CaptureError when one is there already."""
+    if folder.is_dir() and any(folder.iterdir()):
+        raise CaptureError(f"{folder}: is not empty; a capture is written to a new folder")
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / _SETTINGS).write_text(to_toml(settings), encoding="utf-8")
+    for name, segment in segments.items():
+        columns: dict[str, Floats] = {"t": segment.t}
+        for block, names in _BLOCKS.items():
+            values: Floats | None = getattr(segment, block)
+            if values is not None:
+                columns |= dict(zip(names, values.T, strict=True))
+        table.write(folder / f"{name}.{ending}", columns, {n: _UNITS[n] for n in columns if n in _UNITS}, {})
+
+
+_UNITS = (
+    {"t": "s"}
+    | dict.fromkeys(_BLOCKS["acc"], "m/s^2")
+    | dict.fromkeys(_BLOCKS["gyr"], "rad/s")
+    | dict.fromkeys(_BLOCKS["mag"], "uT")
+)
+
+
+# Segment files
+
+
+def _files(folder: Path) -> tuple[dict[Segment, Path], Path | None, list[str]]:
+    """Return the segments' files from the trunk outwards, the truth's, and what was left aside."""
+    found: dict[str, Path] = {}
+    aside: list[str] = []
+    for path in sorted(folder.iterdir()):
+        if path.suffix not in (".csv", ".parquet"):
+            continue
+        if path.stem not in (*SEGMENTS, _TRUTH):
+            if near := difflib.get_close_matches(path.stem, SEGMENTS, n=1, cutoff=0.6):
+                raise CaptureError(f"{path}: unknown segment {path.stem!r}; did you mean {near[0]!r}?")
+            aside.append(f"{path.name} is no segment and was left aside")
+        elif path.stem in found:
+            raise CaptureError(f"{folder}: {found[path.stem].name} and {path.name}: keep one of them")
+        else:
+            found[path.stem] = path
+    segments: dict[Segment, Path] = {name: found[name] for name in SEGMENTS if name in found}
+    if not segments:
+        raise CaptureError(
+            f"{folder}: no segment file; write <segment>.csv or .parquet, {', '.join(SEGMENTS)}"
+        )
+    return segments, found.get(_TRUTH), aside
+
+
+def _segment(path: Path, nominal_hz: float | None) -> CaptureSegment:
+    try:
+        columns = table.read(path).columns
+    except table.TableError as error:
+        raise CaptureError(str(error)) from None
+    if "t" not in columns:
+        raise CaptureError(f"{path}: column t (seconds) is missing; there are {', '.join(columns)}")
+    blocks = {name: _block(path, columns, names) for name, names in _BLOCKS.items()}
+    if (blocks["acc"] is None or blocks["gyr"] is None) and blocks["quat"] is None:
+        raise CaptureError(
+            f"{path}: expected ax ay az and gx gy gz, or qw qx qy qz; there are {', '.join(columns)}"
+        )
+    if (blocks["acc"] is None) != (blocks["gyr"] is None):
+        raise CaptureError(f"{path}: ax ay az and gx gy gz belong together; one of them is missing")
+    t = _numbers(path, columns, "t")
+    keep = np.isfinite(t)
+    for name in ("acc", "gyr", "quat"):
+        if (block := blocks[name]) is not None:
+            keep &= np.isfinite(block).all(axis=1)
+    t, blocks = t[keep], {name: None if b is None else b[keep] for name, b in blocks.items()}
+    _check_time(path, t, np.flatnonzero(keep))
+    if (quat := blocks["quat"]) is not None:
+        blocks["quat"] = _unit(path, quat)
+    if (mag := blocks["mag"]) is not None:
+        blocks["mag"] = np.where(np.isfinite(mag).all(axis=1, keepdims=True), mag, np.nan)
+    own_hz = 1.0 / float(np.median(np.diff(t)))
+    near = nominal_hz is not None and abs(own_hz / nominal_hz - 1.0) < 0.02
+    rate_hz = nominal_hz if near and nominal_hz is not None else own_hz
+    return CaptureSegment(t=t, rate_hz=rate_hz, dropped=int(len(keep) - keep.sum()), **blocks)
+
+
+def _block(path: Path, columns: Mapping[str, table.Column], names: tuple[str, ...]) -> Floats | None:
+    missing = [name for name in names if name not in columns]
+    if len(missing) == len(names):
+        return None
+    if missing:
+        raise CaptureError(
+            f"{path}: column {missing[0]} is missing beside {', '.join(set(names) - set(missing))}"
+        )
+    return np.stack([_numbers(path, columns, name) for name in names], axis=1)
+
+
+def _numbers(path: Path, columns: Mapping[str, table.Column], name: str) -> Floats:
+    if columns[name].dtype.kind not in "if":
+        raise CaptureError(f"{path}: column {name} holds text; expected numbers with a decimal point")
+    return columns[name].astype(np.float64)
+
+
+def _check_time(path: Path, t: Floats, rows: npt.NDArray[np.int64]) -> None:
+    if len(t) < 2:
+        raise CaptureError(f"{path}: {len(t)} whole rows; at least two are needed")
+    back = np.flatnonzero(np.diff(t) <= 0.0)
+    if back.size:
+        i = int(back[0])
+        raise CaptureError(
+            f"{path}: t must grow; data row {rows[i + 1] + 1} has {t[i + 1]:.6f} after {t[i]:.6f}"
+        )
+
+
+def _unit(path: Path, quat: Floats) -> Floats:
+    length = np.linalg.norm(quat, axis=1)
+    worst = int(np.argmax(np.abs(length - 1.0)))
+    if abs(length[worst] - 1.0) > 0.05:
+        raise CaptureError(f"{path}: qw qx qy qz of length {length[worst]:.3f}; a rotation has length 1")
+    unit: Floats = quat / length[:, None]
+    return unit
+
+
+def _doubts(name: str, segment: CaptureSegment) -> list[str]:
+    """Return what looks like another unit, or like loss."""
+    said = []
+    if segment.acc is not None and not 5.0 < float(np.median(np.linalg.norm(segment.acc, axis=1))) < 20.0:
+        said.append(
+            f"{name}: half of all accelerations are far from 9.8; expected m/s^2 with gravity in them"
+        )
+    if segment.gyr is not None and float(np.abs(segment.gyr).max()) > 100.0:
+        said.append(f"{name}: angular rates above 100; expected rad/s")
+    if segment.dropped:
+        said.append(f"{name}: {segment.dropped} rows left out, because a number is missing in them")
+    return said

@@ -1,0 +1,302 @@
+"""Recordings: the bus bytes unchanged in an MCAP file, one channel a key, in order of arrival.
+
+A file that was not closed (power, kill -9) holds all but the last half second: `read` reads it up to the cut,
+`recover` turns it into a closed, indexed one.
+"""
+
+import logging
+import os
+import struct
+import sys
+from collections import Counter
+from collections.abc import Generator, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from types import TracebackType
+from typing import IO, Any, NamedTuple, Self, cast
+
+import zstandard
+from mcap.exceptions import McapError
+from mcap.records import Channel, Chunk, Header, Metadata
+from mcap.records import Message as McapMessage
+from mcap.stream_reader import StreamReader, breakup_chunk
+from mcap.writer import Writer
+
+from brachium_wire import keys, schema
+from brachium_wire.topics import TOPICS
+
+log = logging.getLogger(__name__)
+
+PROFILE = "brachium"
+ENCODING = "msgpack"
+FLUSH_NS = 500_000_000
+SYNC_NS = 1_000_000_000
+
+_MAGIC = b"\x89MCAP0\r\n"
+# What a damaged file can make its parser raise.
+_DAMAGE = (McapError, zstandard.ZstdError, ValueError, struct.error, KeyError, OverflowError, MemoryError)
+
+
+class RecordingError(ValueError):
+    """The file is no recording of ours, or somebody still writes it: one line that says what to do."""
+
+
+class Recorded(NamedTuple):
+    """One message as it came: key, bus bytes, and the host time in ns at which it was written."""
+
+    key: str
+    payload: bytes
+    log_time_ns: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RecoverReport:
+    """What `recover` found: messages a key, and whether anything had to be done."""
+
+    path: Path
+    messages: dict[str, int]
+    recovered: bool
+    """False: the file had been closed and is untouched."""
+    warning: str = ""
+    """Where the file was cut or damaged."""
+
+
+def _lock(file: IO[bytes]) -> bool:
+    """Take the file for this process alone, until it closes it or dies; False when another has it."""
+    if sys.platform != "win32":  # there, a file that is open cannot be replaced at all
+        import fcntl
+
+        try:
+            fcntl.flock(file.fileno(), fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:
+            return False
+    return True
+
+
+class RecordingWriter:
+    """Writes one recording. Use it in a `with` block: closing writes the index and the footer."""
+
+    def __init__(self, path: Path, metadata: Mapping[str, str] | None = None) -> None:
+        """Create `path`; raises FileExistsError when it is there: a recording is never overwritten."""
+        self.path = path
+        self.counts: Counter[str] = Counter()
+        self._channels: dict[str, int] = {}
+        self._schemas: dict[str, int] = {}
+        self._last_ns = 0
+        self._flush_due: int | None = None
+        self._sync_due: int | None = None
+        self._file = path.open("xb")  # buffered: mcap loses the footer of a raw file
+        _lock(self._file)
+        self._writer: Any = cast(Any, Writer)(self._file)  # not fully typed
+        self._writer.start(profile=PROFILE)
+        self._writer.add_metadata(PROFILE, dict(metadata or {}))
+        self._writer.flush()
+
+    def write(self, key: str, payload: bytes, log_time_ns: int) -> None:
+        """Append one message; a time that does not grow becomes 1 ns after the last, so that file order is
+        arrival order.
+
+        Raises keys.BadKey for a key that is not of the topic table.
+        """
+        channel = self._channels.get(key)
+        if channel is None:
+            channel = self._channels[key] = self._register(key)
+        log_time_ns = self._last_ns = max(log_time_ns, self._last_ns + 1)
+        self._writer.add_message(
+            channel, log_time_ns, payload, publish_time=log_time_ns, sequence=self.counts[key]
+        )
+        self.counts[key] += 1
+        self.tick(log_time_ns)
+
+    def tick(self, time_ns: int) -> None:
+        """Bring to the file what is 0.5 s old, and to the disk about each second; call it when idle too."""
+        if self._flush_due is None or self._sync_due is None:
+            self._flush_due, self._sync_due = time_ns + FLUSH_NS, time_ns + SYNC_NS
+        if time_ns >= self._flush_due:
+            self._writer.flush()
+            self._flush_due = time_ns + FLUSH_NS
+        if time_ns >= self._sync_due:
+            os.fsync(self._file.fileno())
+            self._sync_due = time_ns + SYNC_NS
+
+    def close(self) -> None:
+        """Write index and footer and close. Closing twice is harmless."""
+        if self._file.closed:
+            return
+        try:
+            self._writer.finish()
+            self._file.flush()
+            os.fsync(self._file.fileno())
+        finally:
+            self._file.close()
+
+    def _register(self, key: str) -> int:
+        topic = TOPICS.get(keys.parse(key).topic)
+        if topic is None:
+            raise keys.BadKey(f"key {key!r} is of no topic that can be recorded")
+        name = str(topic.message.__struct_config__.tag)
+        if name not in self._schemas:
+            text = schema.text(topic.message).encode()
+            self._schemas[name] = self._writer.register_schema(name, ENCODING, text)
+        return int(self._writer.register_channel(key, ENCODING, self._schemas[name]))
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+
+class Reading:
+    """An iterator over the messages of a recording, in order of arrival.
+
+    `metadata` is there from the start; `warning` and `closed` are final when the iteration has ended.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.metadata: dict[str, str] = {}
+        self.warning = ""
+        self.closed = False
+        """Whether the file's proper end was reached."""
+        self._channels: dict[int, str] = {}
+        self._bad_chunks = self._unnamed = 0
+        self._size = path.stat().st_size
+        self._file = path.open("rb")
+        try:
+            self._records = iter(
+                StreamReader(self._file, emit_chunks=True, record_size_limit=self._size).records
+            )
+            self._check_header()
+        except BaseException:
+            self._file.close()
+            raise
+        self._messages = self._read()
+
+    def __iter__(self) -> Iterator[Recorded]:
+        return self
+
+    def __next__(self) -> Recorded:
+        return next(self._messages)
+
+    def close(self) -> None:
+        """Close the file before the end."""
+        self._messages.close()
+        self._file.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def _check_header(self) -> None:
+        if self._file.peek(len(_MAGIC))[: len(_MAGIC)] != _MAGIC:
+            raise RecordingError(f"{self.path}: not a recording (an MCAP file); made by: brachium record")
+        try:
+            header, first = next(self._records), next(self._records, None)
+        except (*_DAMAGE, StopIteration):
+            raise RecordingError(
+                f"{self.path}: a recording cut before its first message; nothing can be read"
+            ) from None
+        if not isinstance(header, Header) or header.profile != PROFILE:
+            profile = header.profile if isinstance(header, Header) else ""
+            raise RecordingError(
+                f"{self.path}: an MCAP file of another program (profile {profile!r}), not a recording"
+            )
+        if isinstance(first, Metadata):
+            self.metadata = {str(name): str(value) for name, value in first.metadata.items()}
+
+    def _read(self) -> Generator[Recorded, None, None]:
+        try:
+            with self._file:
+                for record in self._records:
+                    if isinstance(record, Chunk):
+                        yield from self._unpack(record)
+            self.closed = True
+        except _DAMAGE as error:
+            where = self._size if self._file.closed else self._file.tell()
+            log.debug("%s: %s near byte %d", self.path, error, where)
+        self._conclude()
+
+    def _unpack(self, chunk: Chunk) -> Iterator[Recorded]:
+        try:
+            records = breakup_chunk(chunk, validate_crc=True)
+        except _DAMAGE:
+            self._bad_chunks += 1
+            return
+        for record in records:
+            if isinstance(record, Channel):
+                self._channels[record.id] = record.topic
+            elif isinstance(record, McapMessage):
+                key = self._channels.get(record.channel_id)
+                if key is None:
+                    self._unnamed += 1
+                else:
+                    yield Recorded(key, record.data, record.log_time)
+
+    def _conclude(self) -> None:
+        said = []
+        if not self.closed:
+            said.append("not closed: read up to the cut")
+        if self._bad_chunks:
+            said.append(f"{self._bad_chunks} damaged blocks left out")
+        if self._unnamed:
+            said.append(
+                f"{self._unnamed} messages left out, because the block that named their key is damaged"
+            )
+        if said:
+            self.warning = f"{self.path}: {'; '.join(said)}"
+
+
+def read(path: Path) -> Reading:
+    """Return an iterator of `Recorded`, also over a file that was cut or damaged (see `Reading.warning`).
+
+    Raises RecordingError for a file that is no recording of ours, and FileNotFoundError.
+    """
+    return Reading(path)
+
+
+def is_recording(path: Path) -> bool:
+    """Return whether `path` is a file that `read` can read."""
+    if not path.is_file():
+        return False
+    try:
+        read(path).close()
+    except RecordingError:
+        return False
+    return True
+
+
+def is_closed(path: Path) -> bool:
+    """Return whether the file ends as a closed one does, without reading it."""
+    with path.open("rb") as file:
+        file.seek(0, os.SEEK_END)
+        if file.tell() < 2 * len(_MAGIC):
+            return False
+        file.seek(-len(_MAGIC), os.SEEK_END)
+        return file.read() == _MAGIC
+
+
+def recover(path: Path) -> RecoverReport:
+    """Rewrite a recording that was not closed into a closed and indexed one, in its place.
+
+    Raises RecordingError when it is no recording, or while another process still writes it.
+    """
+    with path.open("rb") as held, read(path) as reading:
+        if not _lock(held):
+            raise RecordingError(f"{path}: is being written; recover it when the recorder has ended")
+        if is_closed(path):
+            counts = Counter(message.key for message in reading)
+            return RecoverReport(path=path, messages=dict(counts), recovered=False, warning=reading.warning)
+        fresh = path.with_name(path.name + ".recovering")
+        fresh.unlink(missing_ok=True)  # of a recovery that was itself cut short
+        with RecordingWriter(fresh, {**reading.metadata, "recovered": "true"}) as writer:
+            for message in reading:
+                writer.write(*message)
+        fresh.replace(path)
+    return RecoverReport(path=path, messages=dict(writer.counts), recovered=True, warning=reading.warning)
