@@ -1,4 +1,4 @@
-"""Host time: the wall clock read once at start, plus the monotonic clock since. Wall-clock jumps change nothing."""
+"""Host time: the wall clock read once at start, plus the monotonic clock since. Its jumps change nothing."""
 
 import time
 
@@ -35,7 +35,9 @@ def tell_host_time(bus: Bus, room: str, service_id: str, clock: HostClock) -> No
     bus.serve(keys.host_time(room, service_id), lambda _key, _question: msgpack.packb({"t": clock.now_ns()}))
 
 
-def follow_host_time(bus: Bus, room: str, service_id: str, *, rounds: int = 8, timeout_s: float = 1.0) -> HostClock:
+def follow_host_time(
+    bus: Bus, room: str, service_id: str, *, rounds: int = 8, timeout_s: float = 1.0
+) -> HostClock:
     """Return a clock that tells the host time of another service, `info.host` of its sensors.
 
     The quickest of `rounds` questions decides; half its round trip is the uncertainty. Raises NoHostTime.
@@ -53,7 +55,9 @@ def follow_host_time(bus: Bus, room: str, service_id: str, *, rounds: int = 8, t
         if best is None or answered - asked < best[0]:
             best = answered - asked, start_ns
     if best is None:
-        raise NoHostTime(f"{service_id!r} in room {room!r} does not tell its host time; is that gateway running?")
+        raise NoHostTime(
+            f"{service_id!r} in room {room!r} does not tell its host time; is that gateway running?"
+        )
     return HostClock(best[1], best[0] // 2)
 
 

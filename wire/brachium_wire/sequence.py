@@ -2,15 +2,20 @@
 
 from dataclasses import dataclass, field
 
-MAX_HOLES = 256
-"""Gaps that are remembered, so that what fills one is told from what comes twice."""
+MAX_GAPS = 1024
+"""Gaps that are remembered; what comes late into an older one counts as repeated, and stays lost."""
 
 
 @dataclass(slots=True)
 class SequenceCounter:
-    """Counts the samples of one stream. `feed` says what each batch is; the fields are the totals."""
+    """Counts the samples of one stream. `feed` says what each batch is; the fields are the totals.
+
+    Without `next` the first batch that comes sets the start: nothing before it can be lost, and a batch from
+    before it is `repeated`. Give `next=0` for a stream known to begin with 0: the counts are exact from it.
+    """
 
     received: int = 0
+    """Samples that came, each number once."""
     lost: int = 0
     """Numbers that were passed over and did not come yet."""
     out_of_order: int = 0
@@ -19,14 +24,14 @@ class SequenceCounter:
     """Samples that came although nothing was missing there."""
     next: int | None = None
     """The number that should come now; None before the first."""
-    _holes: list[tuple[int, int]] = field(default_factory=list)
-    """What is missing, [from, to), oldest first."""
+    gaps: list[tuple[int, int]] = field(default_factory=list)
+    """What is lost, as [first, end) in ascending order."""
 
     def feed(self, sequence: int, count: int) -> int:
         """Count a batch of `count` samples from `sequence` on.
 
-        Returns the number of samples missing just before it (0 when it is the one expected), or -1 when it is not
-        new: out of order or repeated.
+        Returns the number of samples missing just before it (0 when it is the one expected), or -1 when it
+        begins before the one expected: out of order or repeated. Nothing of it beyond `next` is taken.
         """
         if self.next is None:
             self.next = sequence
@@ -38,8 +43,8 @@ class SequenceCounter:
             self.out_of_order += fills
             self.repeated += count - fills
             return -1
-        self._miss(sequence)
         self.received += count
+        self._miss(sequence)
         self.next = sequence + count
         return gap
 
@@ -50,19 +55,22 @@ class SequenceCounter:
             self.next = sequence
 
     def _miss(self, until: int) -> None:
-        if self.next is not None and until > self.next:
+        assert self.next is not None
+        if until > self.next:
             self.lost += until - self.next
-            self._holes.append((self.next, until))
-            del self._holes[:-MAX_HOLES]
+            self.gaps.append((self.next, until))
+            del self.gaps[:-MAX_GAPS]
 
-    def _fill(self, start: int, end: int) -> int:
-        filled, holes = 0, []
-        for low, high in self._holes:
-            first, last = max(low, start), min(high, end)
-            if first >= last:
-                holes.append((low, high))
+    def _fill(self, first: int, end: int) -> int:
+        """Take [first, end) out of the gaps and return how many numbers that were."""
+        kept: list[tuple[int, int]] = []
+        fills = 0
+        for a, b in self.gaps:
+            low, high = max(a, first), min(b, end)
+            if low >= high:
+                kept.append((a, b))
                 continue
-            filled += last - first
-            holes += [hole for hole in ((low, first), (last, high)) if hole[0] < hole[1]]
-        self._holes = holes
-        return filled
+            fills += high - low
+            kept += [part for part in ((a, low), (high, b)) if part[0] < part[1]]
+        self.gaps = kept
+        return fills
