@@ -241,31 +241,15 @@ class Bus:
         `key` is always one plain key: a query on a wildcard, which may only look for retained values, is
         refused here. When `answer` raises, the error is logged and the asker gets an Answer that says so.
         """
-
-        def asked(query: zenoh.Query) -> None:
-            key = str(query.key_expr)
-            if "*" in key:
-                query.reply_err(f"{key}: one key at a time is answered here")
-                return
-            question = query.payload
-            try:
-                payload = answer(key, b"" if question is None else question.to_bytes())
-            except Exception as error:
-                log.exception("answering %s", key)
-                payload = encode(
-                    Answer(ok=False, reason=f"failed inside: {_line(error)}; see the service's log")
-                )
-            query.reply(key, payload)
-
-        self._keep(self._session.declare_queryable(keys.expression(key_expression), asked))
+        self.serve_later(key_expression, lambda key, question, reply: reply(answer(key, question)))
 
     def serve_later(
         self, key_expression: str, asked: Callable[[str, bytes, Callable[[bytes], None]], None]
     ) -> None:
-        """Take queries on matching keys and answer them when the answer is there.
+        """Take queries on matching keys, as `serve` does, and answer them when the answer is there.
 
-        `asked(key, question, reply)` runs on Zenoh's thread and must not block; `reply(answer)` may be called later,
-        once, from any thread. The asker sets how long it waits.
+        `asked(key, question, reply)` runs on Zenoh's thread and must not block; `reply(answer)` may be called
+        later, once, from any thread. The asker sets how long it waits.
         """
 
         def heard(query: zenoh.Query) -> None:
@@ -278,11 +262,16 @@ class Bus:
             def reply(answer: bytes) -> None:
                 try:
                     query.reply(key, answer)
-                    query.drop()
+                    query.drop()  # type: ignore[no-untyped-call]  # as Zenoh types it; the asker waits no longer
                 except zenoh.ZError as error:
                     log.debug("nobody waits for the answer on %s any more: %s", key, error)
 
-            asked(key, b"" if question is None else question.to_bytes(), reply)
+            try:
+                asked(key, b"" if question is None else question.to_bytes(), reply)
+            except Exception as error:
+                log.exception("answering %s", key)
+                reason = f"failed inside: {_line(error)}; see the service's log"
+                reply(encode(Answer(ok=False, reason=reason)))
 
         self._keep(self._session.declare_queryable(keys.expression(key_expression), heard))
 
