@@ -17,6 +17,7 @@ from typing import IO, Any, NamedTuple, Self, cast
 
 import zstandard
 from mcap.exceptions import McapError
+from mcap.reader import make_reader
 from mcap.records import Channel, Chunk, Header, Metadata
 from mcap.records import Message as McapMessage
 from mcap.stream_reader import StreamReader, breakup_chunk
@@ -300,3 +301,16 @@ def recover(path: Path) -> RecoverReport:
                 writer.write(*message)
         fresh.replace(path)
     return RecoverReport(path=path, messages=dict(writer.counts), recovered=True, warning=reading.warning)
+
+
+def counts(path: Path) -> dict[str, int]:
+    """Return the messages a key of a closed recording, from its index, without reading them."""
+    with path.open("rb") as file:
+        try:
+            found = make_reader(file).get_summary()
+        except _DAMAGE as error:
+            raise RecordingError(f"{path}: not closed or damaged ({error})") from None
+    if found is None or found.statistics is None:
+        raise RecordingError(f"{path}: holds no index")
+    numbers = found.statistics.channel_message_counts
+    return {channel.topic: numbers.get(number, 0) for number, channel in found.channels.items()}

@@ -1,0 +1,213 @@
+"""The recorder: everything a room says, on disk in order of arrival, beginning with fusion's state."""
+
+import logging
+import re
+import threading
+import time
+from collections import Counter
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from datetime import UTC, datetime
+from pathlib import Path
+
+from brachium_wire import keys, recording
+from brachium_wire.bus import DEFAULT_ENDPOINT, Bus, Inbox
+from brachium_wire.codec import Drop, WireError, decode, encode
+from brachium_wire.heart import Heart
+from brachium_wire.hosttime import HostClock
+from brachium_wire.messages import Answer, Command, Snapshot
+from brachium_wire.topics import TOPICS
+
+log = logging.getLogger(__name__)
+
+CAPACITY = 65536
+"""Messages that may wait for the disk: minutes of a usual room."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class RecordSettings:
+    """What to record, and where."""
+
+    endpoint: str = DEFAULT_ENDPOINT
+    room: str = "lab"
+    subject: str | None = None
+    """Only this subject, and the services; None: everybody in the room."""
+    folder: Path = Path("recordings")
+    seconds: float | None = None
+    """How long; None: until stopped."""
+    id: str = "main"
+
+
+@dataclass(frozen=True, kw_only=True)
+class RecordReport:
+    """What a recording holds, as found in the closed file, and what is not in it."""
+
+    path: Path
+    messages: dict[str, int]
+    """Messages a topic."""
+    dropped: dict[str, int] = field(default_factory=dict)
+    """Messages that came and were not recorded, by reason."""
+    missing: dict[str, int] = field(default_factory=dict)
+    """Messages a key that were written and are not in the closed file: none, or the disk is at fault."""
+
+
+class Recorder:
+    """Sorts what arrives into what is recorded and what is dropped, and counts both."""
+
+    def __init__(self, writer: recording.RecordingWriter, subject: str | None = None) -> None:
+        self.writer = writer
+        self._subject = subject
+        self.received: Counter[str] = Counter()
+        self.drops: Counter[str] = Counter()
+
+    def take(self, key: str, payload: bytes, now_ns: int) -> None:
+        """Record one message, or count why not."""
+        try:
+            parsed = keys.parse(key)
+        except keys.BadKey:
+            self.drops[Drop.BAD_KEY.value] += 1
+            return
+        row = TOPICS.get(parsed.topic)
+        if row is None or not row.recorded:
+            return
+        if self._subject is not None and parsed.subject not in (self._subject, keys.SERVICE):
+            return
+        if len(payload) > row.max_bytes:
+            self.drops[Drop.OVERSIZE.value] += 1
+            return
+        self.writer.write(key, payload, now_ns)
+        self.received[key] += 1
+
+    def report(self) -> RecordReport:
+        """Compare what was received with what the closed file holds."""
+        found = recording.counts(self.writer.path)
+        missing = {key: n - found.get(key, 0) for key, n in self.received.items() if n != found.get(key, 0)}
+        topics: Counter[str] = Counter()
+        for key, n in found.items():
+            topics[keys.parse(key).topic] += n
+        return RecordReport(
+            path=self.writer.path, messages=dict(topics), dropped=dict(self.drops), missing=missing
+        )
+
+
+def run(settings: RecordSettings, stop: threading.Event) -> RecordReport:
+    """Record the room until `stop` is set or the time is over, and say what the file holds.
+
+    Raises NoRouter, and OSError when the disk takes no more.
+    """
+    settings.folder.mkdir(parents=True, exist_ok=True)
+    recover_folder(settings.folder)
+    clock = HostClock()
+    with Bus.open(settings.endpoint, stop=stop) as bus:
+        # Subscribed before anything is asked for: what comes in the meantime waits in the inbox.
+        inbox = bus.subscribe(keys.everything(settings.room), CAPACITY)
+        heart = Heart(bus, settings.room, "recorder", settings.id)
+        with _create(settings) as writer:
+            recorder = Recorder(writer, settings.subject)
+            heart.text = writer.path.name
+            for key, payload in opening(bus, settings.room, settings.subject):
+                recorder.take(key, payload, clock.now_ns())
+            log.info("recording to %s", writer.path)
+            _record(recorder, inbox, heart, clock, settings.seconds, stop)
+    report = recorder.report()
+    for key, n in report.missing.items():
+        log.error("%s: %d messages of %s were received and are not in the file", report.path, n, key)
+    return report
+
+
+def recover_folder(folder: Path) -> list[recording.RecoverReport]:
+    """Close, index and count the recordings in a folder that a crash left open; others are left alone."""
+    reports = []
+    for path in sorted(folder.glob("*.mcap")):
+        if recording.is_closed(path):
+            continue
+        try:
+            report = recording.recover(path)
+        except recording.RecordingError as error:
+            log.warning("%s", error)
+            continue
+        log.warning("%s had not been closed: recovered %d messages", path, sum(report.messages.values()))
+        reports.append(report)
+    return reports
+
+
+def opening(bus: Bus, room: str, subject: str | None = None) -> list[tuple[str, bytes]]:
+    """Return what a recording begins with: fusion's snapshot of each subject, then all retained messages."""
+    retained = []
+    for row in TOPICS.values():
+        if row.retained and row.recorded:
+            tail = re.sub("<[a-z]+>", "*", row.pattern.removeprefix("<subject>/"))
+            retained += bus.fetch(keys.subjects(room, tail, subject or "*"))
+    found = _subjects(key for key, _ in retained)
+    return [one for who in found if (one := _snapshot(bus, room, who)) is not None] + retained
+
+
+def _subjects(names: Iterable[str]) -> list[str]:
+    found = set()
+    for key in names:
+        try:
+            found.add(keys.parse(key).subject)
+        except keys.BadKey:
+            continue
+    return sorted(found)
+
+
+def _snapshot(bus: Bus, room: str, subject: str) -> tuple[str, bytes] | None:
+    """Ask fusion for its state; None when nobody answers, or not with a snapshot."""
+    reply = bus.ask(keys.command(room, subject, "record"), encode(Command()))
+    if reply is None:
+        log.info("no fusion answered for %s: the recording begins without its state", subject)
+        return None
+    limit = TOPICS["snapshot"].max_bytes
+    try:
+        answer = decode(reply, Answer, limit + 1024)
+        payload = answer.data.get("snapshot")
+        if not answer.ok or not isinstance(payload, bytes):
+            raise WireError(Drop.MALFORMED, answer.reason or "the answer holds no snapshot")
+        decode(payload, Snapshot, limit)
+    except WireError as error:
+        log.warning("the recording begins without fusion's state of %s: %s", subject, error)
+        return None
+    return keys.snapshot(room, subject), payload
+
+
+def _create(settings: RecordSettings) -> recording.RecordingWriter:
+    """Create the next free file of the folder."""
+    started = datetime.now(UTC)
+    stem = f"{settings.subject or settings.room}-{started:%Y-%m-%dT%H-%M-%SZ}"
+    metadata = {"room": settings.room, "started": started.isoformat(timespec="seconds")}
+    for number in range(1, 1000):
+        path = settings.folder / (f"{stem}.mcap" if number == 1 else f"{stem}-{number}.mcap")
+        try:
+            return recording.RecordingWriter(path, metadata)
+        except FileExistsError:
+            continue
+    raise FileExistsError(f"{settings.folder / stem}.mcap and 998 more are there already")
+
+
+def _record(
+    recorder: Recorder,
+    inbox: Inbox,
+    heart: Heart,
+    clock: HostClock,
+    seconds: float | None,
+    stop: threading.Event,
+) -> None:
+    end = None if seconds is None else time.monotonic() + seconds
+    while not stop.is_set() and (end is None or time.monotonic() < end):
+        inbox.wait(0.1)
+        _drain(recorder, inbox, heart, clock)
+        heart.beat()
+    _drain(recorder, inbox, heart, clock)
+    heart.beat(now=True)
+
+
+def _drain(recorder: Recorder, inbox: Inbox, heart: Heart, clock: HostClock) -> None:
+    for key, payload in inbox.drain():
+        recorder.take(key, payload, clock.now_ns())
+    recorder.writer.tick(clock.now_ns())
+    if inbox.dropped:
+        recorder.drops[Drop.OVERFLOW.value] = inbox.dropped
+    heart.counts["recorded"] = sum(recorder.received.values())
+    for name, n in recorder.drops.items():
+        heart.drops[name] = n
