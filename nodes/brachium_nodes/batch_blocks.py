@@ -5,12 +5,12 @@ from operator import lt
 from struct import unpack
 
 import numpy as np
-from brachium_wire.codec import Drop, WireError
-from brachium_wire.messages import SampleBatch, Vector
-from brachium_wire.samples import read_samples
 
 from brachium_nodes.clock import Integers
 from brachium_nodes.node_frames import MAX_FRAME_SAMPLES, MAX_SPAN_US, Batch, Hello
+from brachium_wire.codec import Drop, WireError
+from brachium_wire.messages import SampleBatch, Vector
+from brachium_wire.samples import read_samples
 
 MAX_SEQUENCE = 1 << 48
 MAX_DEVICE_US = 1 << 50
@@ -35,7 +35,8 @@ def measure(frame: Batch, hello: Hello) -> Measured:
     n, tail = divmod(len(frame.offsets), 4)
     if tail or not 1 <= n <= MAX_FRAME_SAMPLES:
         raise WireError(
-            Drop.WRONG_SHAPE, f"batch/1: dt of {len(frame.offsets)} bytes; 1 to {MAX_FRAME_SAMPLES} u32 are taken"
+            Drop.WRONG_SHAPE,
+            f"batch/1: dt of {len(frame.offsets)} bytes; 1 to {MAX_FRAME_SAMPLES} u32 are taken",
         )
     offsets = unpack(f"<{n}I", frame.offsets)
     if offsets[0] != 0 or offsets[-1] > MAX_SPAN_US or not all(map(lt, offsets, offsets[1:])):
@@ -64,6 +65,8 @@ def _si(block: bytes | None, scale: Vector | None, big_endian: bool) -> bytes | 
     if block is None or scale is None:
         return block
     if len(block) % 6:
-        raise WireError(Drop.WRONG_SHAPE, f"batch/1: a block of {len(block)} bytes does not hold triples of i16")
+        raise WireError(
+            Drop.WRONG_SHAPE, f"batch/1: a block of {len(block)} bytes does not hold triples of i16"
+        )
     steps = np.frombuffer(block, dtype=">i2" if big_endian else "<i2").reshape(-1, 3)
-    return (steps * np.array(scale)).astype("<f4").tobytes()
+    return bytes((steps * np.array(scale)).astype("<f4").tobytes())

@@ -1,8 +1,9 @@
 """When was it, in host time? One node's clock against the host's, from messages that took unknown times.
 
-Every arrival of device time x at host time h says that the offset h - x is at most that large, every question sent at
-h that the node had at x that it is at least that large. The line that keeps below the ones and above the others with
-the smallest sum of gaps (Moon, Skelly and Towsley, INFOCOM 1999, both directions with one slope) is the node's clock.
+Every arrival of device time x at host time h says that the offset h - x is at most that large, every question
+sent at h that the node had at x that it is at least that large. The line that keeps below the ones and above the
+others with the smallest sum of gaps (Moon, Skelly and Towsley, INFOCOM 1999, both directions with one slope) is
+the node's clock.
 """
 
 from collections import deque
@@ -81,8 +82,9 @@ class NodeClock:
         self._refit(device_us, host_ns)
 
     def exchange(self, asked_ns: int, came_us: int, left_us: int, answered_ns: int) -> bool:
-        """Take a question sent at `asked_ns` and answered at `answered_ns` (host), at the node from `came_us` to
-        `left_us`. Returns False when these cannot be: nothing is taken then."""
+        """Take a question sent at `asked_ns` and answered at `answered_ns` (host times) that the node had from
+        `came_us` to `left_us` (its own). Returns False when these cannot be: nothing is taken then.
+        """
         round_trip = (answered_ns - asked_ns) - (left_us - came_us) * 1000
         backwards = bool(self._downs) and came_us < self._downs[-1][0]
         if left_us < came_us or round_trip < 0 or backwards:
@@ -157,7 +159,11 @@ class NodeClock:
             self._settled = True
         elif not self._settled:
             came_us, offset, round_trip = min(self._exchanges, key=lambda e: e[2])
-            self._intercept, self._slope, self._gap_ns = float(offset - self._origin_ns), 0.0, float(round_trip)
+            self._intercept, self._slope, self._gap_ns = (
+                float(offset - self._origin_ns),
+                0.0,
+                float(round_trip),
+            )
             self._fit_us = came_us
         else:
             return False  # nobody answers any more: the last line stands and grows uncertain
@@ -165,15 +171,17 @@ class NodeClock:
 
     def _points(self, points: deque[tuple[int, int]]) -> Floats:
         rows = np.array(points, dtype=np.int64)
-        return np.column_stack([rows[:, 0] - self._origin_us, rows[:, 1] - self._origin_ns]).astype(np.float64)
+        return np.column_stack([rows[:, 0] - self._origin_us, rows[:, 1] - self._origin_ns]).astype(
+            np.float64
+        )
 
 
 def between(ups: Floats, downs: Floats) -> tuple[float, float, float]:
     """Return intercept, slope and gap of the middle line between points above (n, 2) and points below (m, 2).
 
-    For a slope b the upper line touches at min(y - b x), the lower at max(y - b x); the sum of all gaps, each side
-    weighted alike, is concave in b and its best slope is found by narrowing a grid. The gap is negative when no
-    line keeps them apart.
+    For a slope b the upper line touches at min(y - b x), the lower at max(y - b x); the sum of all gaps, each
+    side weighted alike, is convex in b and its best slope is found by narrowing a grid. The gap is negative when
+    no line keeps them apart.
     """
     middle = float(np.mean(ups[:, 0]))
     x_up, y_up = ups[:, 0] - middle, ups[:, 1]

@@ -5,13 +5,12 @@ from dataclasses import dataclass
 from typing import Literal
 
 import msgspec
-import numpy as np
-from brachium_wire.codec import Drop, WireError, encode
-from brachium_wire.messages import Info, Message, SampleBatch, Status
 
 from brachium_nodes import node_frames as f
 from brachium_nodes.batch_blocks import Measured, measure
 from brachium_nodes.roster import Admission, Refusal
+from brachium_wire.codec import Drop, WireError, encode
+from brachium_wire.messages import Info, Message, SampleBatch, Status
 
 HELLO_WITHIN_NS = 3_000_000_000
 STATUS_NS = 1_000_000_000
@@ -69,6 +68,11 @@ class Conversation:
         self._counted_ns, self._counted = now_ns, 0
         self._held: list[tuple[Measured, int]] = []
 
+    @property
+    def subject(self) -> str | None:
+        """Whose node this is, once it was let in."""
+        return self.admission.subject if self.admission is not None else None
+
     def receive(self, payload: bytes | str, now_ns: int) -> list[Action]:
         """Take a WebSocket message that came at host time `now_ns`."""
         if self.closed:
@@ -89,7 +93,7 @@ class Conversation:
             return []
 
     def tick(self, now_ns: int) -> list[Action]:
-        """Do what time asks for: clock questions, status, the end of patience. Call it at least each 50 ms."""
+        """Do what time asks for: clock questions, status, the end of patience. Call it every 50 ms."""
         if self.closed:
             return []
         if self.admission is None:
@@ -117,7 +121,7 @@ class Conversation:
 
     def expel(self, refusal: Refusal) -> list[Action]:
         """End the connection from this side, telling the node why."""
-        return [] if self.closed else self._refuse(refusal)
+        return [] if self.closed else [*self._release(), *self._refuse(refusal)]
 
     def status(self, now_ns: int, *, connected: bool) -> Status:
         """Return how the node fares."""
@@ -125,7 +129,9 @@ class Conversation:
         assert self.hello is not None
         memory, said = self.admission.memory, self._said
         elapsed = now_ns - self._counted_ns
-        rate = (memory.counter.received - self._counted) / (elapsed * 1e-9) if elapsed > STATUS_NS // 2 else None
+        rate = (
+            (memory.counter.received - self._counted) / (elapsed * 1e-9) if elapsed > STATUS_NS // 2 else None
+        )
         self._counted_ns, self._counted = now_ns, memory.counter.received
         clock = memory.clock
         return Status(
@@ -149,7 +155,9 @@ class Conversation:
 
     def _greet(self, frame: f.NodeFrame, now_ns: int) -> list[Action]:
         if not isinstance(frame, f.Hello) or self.admission is not None:
-            expected = "hello/1 comes once" if self.admission is not None else "the first frame must be hello/1"
+            expected = (
+                "hello/1 comes once" if self.admission is not None else "the first frame must be hello/1"
+            )
             return self._refuse(Refusal("bad_hello", expected))
         answer = self._admit(frame)
         if isinstance(answer, Refusal):
@@ -212,7 +220,9 @@ class Conversation:
         expected = memory.counter.next
         in_order = not batch.late and (expected is None or batch.sequence >= expected)
         if in_order and measured.device_us[0] <= memory.newest_us:
-            raise WireError(Drop.TIME_BACKWARDS, f"batch/1: t {batch.device_us} is not after the sample before")
+            raise WireError(
+                Drop.TIME_BACKWARDS, f"batch/1: t {batch.device_us} is not after the sample before"
+            )
         newest_us = int(measured.device_us[-1])
         if not clock.known:
             clock.arrival(newest_us, received_ns)
@@ -233,7 +243,9 @@ class Conversation:
         sequence = batch.sequence + memory.base
         if in_order:
             memory.newest_us = newest_us
-            times = times + max(0, place.newest_ns + 1 - int(times[0]))  # another node or boot was here before
+            times = times + max(
+                0, place.newest_ns + 1 - int(times[0])
+            )  # another node or boot was here before
             place.newest_ns, place.next_sequence = int(times[-1]), sequence + len(measured)
         shared: SampleBatch = msgspec.structs.replace(
             batch,

@@ -6,6 +6,7 @@ docs/node-protocol.md explains every field to someone who writes a node in anoth
 from typing import Literal
 
 import msgspec
+
 from brachium_wire import codec
 from brachium_wire.codec import Drop, WireError
 from brachium_wire.messages import Message, Origin, SensorCalibration, Vector

@@ -4,12 +4,11 @@ import hmac
 from collections import Counter
 from dataclasses import dataclass, field, replace
 
+from brachium_nodes.clock import NodeClock
+from brachium_nodes.node_frames import MAX_RATE_HZ, Hello, RefusalCode
 from brachium_wire import keys
 from brachium_wire.messages import Quaternion
 from brachium_wire.sequence import SequenceCounter
-
-from brachium_nodes.clock import NodeClock
-from brachium_nodes.node_frames import MAX_RATE_HZ, Hello, RefusalCode
 
 MAX_WAITING = 64
 """Unknown nodes that are remembered; more than a room holds are not a mistake but an attack."""
@@ -40,7 +39,7 @@ class Memory:
     newest_us: int = -1
     """Device time of the newest sample in order."""
     base: int | None = None
-    """What is added to the node's numbers so that the segment's go on when another node or boot takes over."""
+    """What is added to the node's numbers, so that the segment's go on when another node takes over."""
 
 
 @dataclass(slots=True)
@@ -93,10 +92,6 @@ class Roster:
         """Ids of nodes that asked to join and are not assigned."""
         return list(self._waiting)
 
-    def connected(self, node: str) -> tuple[str, str] | None:
-        """Return subject and segment of a node that is connected now."""
-        return self._connected.get(node)
-
     def knows(self, token_sha256: str) -> bool:
         """Return whether anyone may connect with this token; takes equally long whatever the answer."""
         known = [e.token_sha256 for e in self._entries.values()]
@@ -105,25 +100,35 @@ class Roster:
         return bool(sum([hmac.compare_digest(k, token_sha256) for k in known]))
 
     def admit(self, hello: Hello, token_sha256: str, other_host: str | None) -> Admission | Refusal:
-        """Return whether the node that says hello may join. `other_host(subject)` is asked by the caller: pass the
-        host through which the node's subject already comes in, or None."""
+        """Return whether the node that says hello may join.
+
+        `other_host` is another host through which the node's subject already comes in, or None.
+        """
         wrong = _wrong(hello)
         if wrong:
             return Refusal("bad_hello", wrong)
         entry = self._entries.get(hello.node)
         if entry is not None and not hmac.compare_digest(entry.token_sha256, token_sha256):
-            return Refusal("wrong_token", f"the token does not belong to node {hello.node}; give it its own token")
+            return Refusal(
+                "wrong_token", f"the token does not belong to node {hello.node}; give it its own token"
+            )
         if entry is None or entry.subject is None or entry.segment is None:
             if hello.node not in self._waiting and len(self._waiting) < MAX_WAITING:
                 self._waiting[hello.node] = token_sha256
             how = f"brachium gateway --assign {hello.node}=SUBJECT/SEGMENT"
-            return Refusal("unknown_node", f"node {hello.node} is not assigned to anyone; assign it with: {how}", 5.0)
+            return Refusal(
+                "unknown_node", f"node {hello.node} is not assigned to anyone; assign it with: {how}", 5.0
+            )
         place = (entry.subject, entry.segment)
         holder = next((n for n, p in self._connected.items() if p == place and n != hello.node), None)
         if holder is not None:
-            return Refusal("segment_taken", f"{place[1]} of {place[0]} is held by node {holder}; switch it off first", 5.0)
+            return Refusal(
+                "segment_taken",
+                f"{place[1]} of {place[0]} is held by node {holder}; switch it off first",
+                5.0,
+            )
         if other_host is not None:
-            text = f"{entry.subject} comes in through host {other_host}; all nodes of a subject connect to one gateway"
+            text = f"{entry.subject} comes in through host {other_host}; connect all nodes of a subject there"
             return Refusal("second_host", text, 5.0)
         memory = self._memories.get(hello.node)
         if memory is None or memory.boot != hello.boot:
@@ -158,7 +163,9 @@ class Roster:
             entry = NodeEntry(id=node, token_sha256=token)
         holder = next((n for n, p in self._connected.items() if p == (subject, segment) and n != node), None)
         if holder is not None:
-            return f"{segment} of {subject} is held by node {holder}; assign that one elsewhere or switch it off"
+            return (
+                f"{segment} of {subject} is held by node {holder}; assign that one elsewhere or switch it off"
+            )
         self._entries[node] = replace(entry, subject=subject, segment=segment, mounting=mounting)
         self._waiting.pop(node, None)
         self._memories.pop(node, None)
@@ -193,5 +200,7 @@ def _wrong(hello: Hello) -> str:
     for name in ("acc", "gyr", "mag"):
         scale = getattr(hello.scales, name)
         if scale is not None and not all(1e-9 < abs(step) < 10.0 for step in scale):
-            return f"scale of {name} {scale} cannot be used: give what one step is worth in SI units (mag: uT)"
+            return (
+                f"scale of {name} {scale} cannot be used: give what one step is worth in SI units (mag: uT)"
+            )
     return ""

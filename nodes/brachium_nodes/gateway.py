@@ -1,0 +1,267 @@
+"""The gateway: nodes come in by WebSocket, their samples go out on the bus with host time."""
+
+import asyncio
+import hashlib
+import ipaddress
+import logging
+import threading
+from collections.abc import Callable
+from concurrent.futures import Future
+from concurrent.futures import TimeoutError as NoAnswer
+from dataclasses import dataclass
+from http import HTTPStatus
+
+import msgspec
+from websockets.asyncio.server import ServerConnection, serve
+from websockets.http11 import Request, Response
+
+from brachium_nodes.connection import Connection
+from brachium_nodes.conversation import Conversation
+from brachium_nodes.host_claim import HostClaims, checked_host
+from brachium_nodes.node_frames import MAX_FRAME_BYTES, Hello
+from brachium_nodes.roster import Admission, NodeEntry, Refusal, Roster
+from brachium_wire import keys
+from brachium_wire.bus import DEFAULT_ENDPOINT, Bus
+from brachium_wire.codec import WireError, decode, encode
+from brachium_wire.heart import Heart
+from brachium_wire.hosttime import HostClock, tell_host_time
+from brachium_wire.messages import Answer, Command, Message, Quaternion, SampleBatch
+
+log = logging.getLogger(__name__)
+
+PATH = "/node"
+STOP_LOOK_S = 0.05
+
+
+class CannotListen(RuntimeError):
+    """The address or port cannot be had; the text says which and what to do."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class GatewaySettings:
+    """One gateway. Every node needs a token; there is no way in without."""
+
+    endpoint: str = DEFAULT_ENDPOINT
+    room: str = "lab"
+    id: str = "gateway"
+    """Names the service and its clock: `info.host` of its nodes."""
+    bind: str = "127.0.0.1"
+    port: int = 8765
+    """0 takes any free port; the health's text says which."""
+    nodes: tuple[NodeEntry, ...] = ()
+    join_token_sha256: str | None = None
+    """A token with which new nodes may knock; they wait until they are assigned."""
+
+
+def token_sha256(token: str) -> str:
+    """Return what the node table keeps of a token."""
+    return hashlib.sha256(token.encode()).hexdigest()
+
+
+def run(settings: GatewaySettings, stop: threading.Event) -> None:
+    """Serve nodes until `stop` is set. Raises CannotListen, BadKey, ValueError or NoRouter, each one line."""
+    address = _address(settings.bind)
+    checked_host(settings.id)
+    roster = Roster(settings.nodes, settings.join_token_sha256)
+    with Bus.open(settings.endpoint, stop=stop) as bus:
+        asyncio.run(Gateway(bus, settings, roster).serve(address, stop))
+
+
+class Gateway:
+    """Joins connections, roster and bus. All runs on one event loop; only `_assign` is called from outside."""
+
+    def __init__(self, bus: Bus, settings: GatewaySettings, roster: Roster) -> None:
+        self._bus, self._settings, self._roster = bus, settings, roster
+        self._clock = HostClock()
+        self._claims = HostClaims(bus, settings.room, settings.id)
+        self._connections: dict[str, Connection] = {}
+        self._tokens: dict[str, Callable[[], None]] = {}
+        self._tasks: set[asyncio.Task[None]] = set()
+
+    async def serve(self, address: str, stop: threading.Event) -> None:
+        """Listen until `stop` is set."""
+        settings, quiet = self._settings, logging.getLogger(f"{__name__}.websockets")
+        quiet.setLevel(logging.CRITICAL)  # every stranger's half handshake would be a traceback
+        server = serve(
+            self._join,
+            address,
+            settings.port,
+            process_request=self._door,
+            compression=None,
+            max_size=MAX_FRAME_BYTES,
+            max_queue=16,
+            ping_interval=5,
+            ping_timeout=10,
+            open_timeout=3,
+            close_timeout=1,
+            logger=quiet,
+        )
+        try:
+            listening = await server
+        except OSError as error:
+            raise CannotListen(_why(error, address, settings.port)) from None
+        async with listening:
+            port = listening.sockets[0].getsockname()[1]
+            self._heart = Heart(self._bus, settings.room, "gateway", settings.id)
+            self._heart.text = f"ws://{f'[{address}]' if ':' in address else address}:{port}{PATH}"
+            tell_host_time(self._bus, settings.room, settings.id, self._clock)
+            loop = asyncio.get_running_loop()
+            self._bus.serve(keys.commands(settings.room, "assign"), lambda k, q: self._assign(loop, k, q))
+            log.info("gateway %s takes nodes at %s", settings.id, self._heart.text)
+            self._beat(now=True)
+            while not stop.is_set():
+                await asyncio.sleep(STOP_LOOK_S)
+                self._beat()
+                self._give_way()
+        self._beat(now=True)
+        log.info("gateway %s ended", settings.id)
+
+    def _door(self, connection: ServerConnection, request: Request) -> Response | None:
+        if request.path != PATH:
+            return connection.respond(HTTPStatus.NOT_FOUND, f"nodes connect to {PATH}\n")
+        if not self._roster.knows(_presented(request)):
+            self._heart.drops["unauthorized"] += 1
+            return connection.respond(
+                HTTPStatus.UNAUTHORIZED, "send Authorization: Bearer and this node's token\n"
+            )
+        return None
+
+    async def _join(self, socket: ServerConnection) -> None:
+        assert socket.request is not None
+        token = _presented(socket.request)
+
+        def admit(hello: Hello) -> Admission | Refusal:
+            return self._admit(hello, token, connection)
+
+        conversation = Conversation(admit, self._settings.id, self._clock.now_ns())
+        connection = Connection(socket, conversation, self._clock, self._publish, self._left)
+        await connection.run()
+
+    def _admit(self, hello: Hello, token: str, connection: Connection) -> Admission | Refusal:
+        subject = self._roster.subject_of(hello.node)
+        other = self._claims.other(subject) if subject is not None else None
+        answer = self._roster.admit(hello, token, other)
+        if isinstance(answer, Refusal):
+            self._heart.counts["refused"] += 1
+            log.info("node %s refused: %s", hello.node[:64], answer.reason)
+            return answer
+        if answer.replaces:
+            old = self._connections[hello.node]
+            old.replaced = True
+            self._expel(old, Refusal("replaced", f"a newer connection of node {hello.node} took over"))
+        self._connections[hello.node] = connection
+        self._claims.claim(answer.subject)
+        if hello.node not in self._tokens:
+            key = keys.alive(self._settings.room, "node", hello.node)
+            self._tokens[hello.node] = self._bus.announce(key)
+        log.info("node %s joined as %s of %s", hello.node, answer.segment, answer.subject)
+        return answer
+
+    def _left(self, connection: Connection) -> None:
+        hello, admission = connection.conversation.hello, connection.conversation.admission
+        if hello is None or admission is None or self._connections.get(hello.node) is not connection:
+            return
+        del self._connections[hello.node]
+        self._roster.leave(hello.node)
+        self._tokens.pop(hello.node)()
+        if admission.subject not in self._subjects():
+            self._claims.release(admission.subject)
+        log.info("node %s left", hello.node)
+
+    def _publish(self, admission: Admission, topic: str, message: Message) -> None:
+        room, subject, segment = self._settings.room, admission.subject, admission.segment
+        if topic == "info":
+            self._bus.retain(keys.info(room, subject, segment), encode(message))
+        elif topic == "status":
+            self._bus.put(keys.status(room, subject, segment), encode(message))
+        else:
+            assert isinstance(message, SampleBatch)
+            self._heart.counts["batches"] += 1
+            self._heart.counts["samples"] += len(message.offsets) // 4
+            self._bus.put(keys.imu(room, subject, segment), encode(message))
+
+    def _expel(self, connection: Connection, refusal: Refusal) -> None:
+        task = asyncio.create_task(connection.do(connection.conversation.expel(refusal)))
+        self._tasks.add(task)
+        task.add_done_callback(self._tasks.discard)
+
+    def _give_way(self) -> None:
+        for subject in self._subjects():
+            if self._claims.yields(subject):
+                text = f"{subject} comes in through host {self._claims.other(subject)}"
+                for connection in list(self._connections.values()):
+                    if connection.conversation.subject == subject:
+                        self._expel(connection, Refusal("second_host", text, 5.0))
+
+    def _subjects(self) -> set[str]:
+        return {s for c in self._connections.values() if (s := c.conversation.subject) is not None}
+
+    def _beat(self, *, now: bool = False) -> None:
+        self._heart.waiting = self._roster.waiting
+        self._heart.counts["nodes"] = len(self._connections)
+        self._heart.beat(now=now)
+
+    def _assign(self, loop: asyncio.AbstractEventLoop, key: str, question: bytes) -> bytes:
+        """Answer `command/assign`, asked on one of Zenoh's threads."""
+        answer: Future[Answer] = Future()
+
+        def work() -> None:
+            answer.set_result(self._assigned(key, question))
+
+        try:
+            loop.call_soon_threadsafe(work)
+            return encode(answer.result(timeout=2.0))
+        except (RuntimeError, NoAnswer):
+            return encode(Answer(ok=False, reason="the gateway is ending"))
+
+    def _assigned(self, key: str, question: bytes) -> Answer:
+        try:
+            subject = keys.parse(key).subject
+            arguments = decode(question, Command, 65536).arguments
+            wanted = msgspec.convert(arguments, _Assign)
+        except (keys.BadKey, WireError, msgspec.ValidationError) as error:
+            return Answer(ok=False, reason=f"assign takes id, segment and perhaps mounting: {error}")
+        reason = self._roster.assign(wanted.id, subject, wanted.segment, wanted.mounting)
+        if reason:
+            return Answer(ok=False, reason=reason)
+        log.warning(
+            "node %s is now %s of %s; put it into the site file to keep it",
+            wanted.id,
+            wanted.segment,
+            subject,
+        )
+        connection = self._connections.get(wanted.id)
+        if connection is not None:
+            self._expel(connection, Refusal("reassigned", f"assigned to {wanted.segment} of {subject}", 0.0))
+        self._beat(now=True)
+        return Answer(ok=True)
+
+
+class _Assign(msgspec.Struct):
+    id: str
+    segment: str
+    mounting: Quaternion | None = None
+
+
+def _presented(request: Request) -> str:
+    """Return the SHA-256 of the bearer token of a request."""
+    kind, _, token = request.headers.get("Authorization", "").partition(" ")
+    return token_sha256(token.strip() if kind.lower() == "bearer" else "")
+
+
+def _address(bind: str) -> str:
+    try:
+        address = ipaddress.ip_address(bind)
+    except ValueError:
+        raise CannotListen(
+            f"--bind {bind!r} is no address; give one of this machine, as in 127.0.0.1"
+        ) from None
+    if address.is_unspecified:
+        raise CannotListen(f"--bind {bind} would listen everywhere; give the address of one interface")
+    return str(address)
+
+
+def _why(error: OSError, address: str, port: int) -> str:
+    if "in use" in str(error):
+        return f"port {port} of {address} is in use: another gateway is running, or choose another --port"
+    return f"the gateway cannot listen at {address} port {port}: {error.strerror or error}"

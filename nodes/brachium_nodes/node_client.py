@@ -1,0 +1,138 @@
+"""A node's side of the WebSocket: says hello, answers clock questions, sends frames, leaves with its count."""
+
+import asyncio
+from collections.abc import Callable
+
+from websockets.asyncio.client import ClientConnection, connect
+from websockets.exceptions import ConnectionClosed, InvalidHandshake, InvalidStatus, InvalidURI
+
+from brachium_nodes.node_frames import (
+    MAX_FRAME_BYTES,
+    Batch,
+    Bye,
+    ClockAnswer,
+    ClockAsk,
+    Hello,
+    NodeStatus,
+    RefusalCode,
+    Refused,
+    Welcome,
+    from_gateway,
+)
+from brachium_wire.codec import WireError, encode
+
+LEAVE_WITHIN_S = 2.0
+
+
+class NoGateway(ConnectionError):
+    """Nobody answers at the address, or somebody who is no gateway; trying again may help."""
+
+
+class NotWelcome(RuntimeError):
+    """The gateway refused the node; `code` is its reason in one word, "wrong_token" for HTTP 401."""
+
+    def __init__(self, code: RefusalCode, reason: str, retry_s: float | None) -> None:
+        super().__init__(reason)
+        self.code, self.retry_s = code, retry_s
+
+
+class NodeClient:
+    """One connection of one node. `device_us` reads the node's clock."""
+
+    def __init__(self, url: str, token: str, hello: Hello, device_us: Callable[[], int]) -> None:
+        self._url, self._token, self._hello, self._device_us = url, token, hello, device_us
+        self._socket: ClientConnection | None = None
+        self._reader: asyncio.Task[None] | None = None
+        self.refused: Refused | None = None
+        """What the gateway said when it ended the connection."""
+
+    async def join(self) -> Welcome:
+        """Connect and be let in. Raises NoGateway or NotWelcome."""
+        try:
+            self._socket = await connect(
+                self._url,
+                additional_headers={"Authorization": f"Bearer {self._token}"},
+                compression=None,
+                max_size=MAX_FRAME_BYTES,
+                ping_interval=5,
+                ping_timeout=10,
+                open_timeout=3,
+                close_timeout=1,
+                proxy=None,
+            )
+        except InvalidStatus as error:
+            if error.response.status_code == 401:
+                text = f"{self._url} does not know the token of node {self._hello.node}"
+                raise NotWelcome("wrong_token", text, None) from None
+            raise NoGateway(f"{self._url} answers {error.response.status_code}; is it a gateway?") from None
+        except (OSError, InvalidHandshake, TimeoutError) as error:
+            raise NoGateway(
+                f"no gateway at {self._url} ({error}); start one with: brachium gateway"
+            ) from None
+        except InvalidURI as error:
+            raise NoGateway(f"{error}; write it as ws://127.0.0.1:8765/node") from None
+        try:
+            await self._socket.send(encode(self._hello))
+            answer = from_gateway(await self._socket.recv())
+        except (ConnectionClosed, WireError) as error:
+            await self._socket.close()
+            raise NoGateway(f"{self._url} ended the conversation: {error}") from None
+        if isinstance(answer, Refused):
+            await self._socket.close()
+            raise NotWelcome(answer.code, answer.reason, answer.retry_s)
+        if not isinstance(answer, Welcome):
+            await self._socket.close()
+            raise NoGateway(f"{self._url} answered a hello with {type(answer).__name__}")
+        self._reader = asyncio.create_task(self._listen(self._socket))
+        return answer
+
+    async def send(self, frame: Batch | NodeStatus) -> None:
+        """Send a frame. Raises ConnectionError when the connection is gone."""
+        await self.send_bytes(encode(frame))
+
+    async def send_bytes(self, frame: bytes) -> None:
+        """Send a frame as it is."""
+        assert self._socket is not None
+        try:
+            await self._socket.send(frame)
+        except ConnectionClosed as error:
+            raise ConnectionError(str(error)) from None
+
+    async def leave(self, next_sequence: int) -> None:
+        """Say bye and wait until the gateway has counted and closed."""
+        try:
+            await self.send_bytes(encode(Bye(next_sequence=next_sequence)))
+            async with asyncio.timeout(LEAVE_WITHIN_S):
+                await self.closed()
+        except (ConnectionError, TimeoutError):
+            pass
+        await self.close()
+
+    async def closed(self) -> int:
+        """Wait until the connection is closed; return the close code."""
+        assert self._socket is not None
+        await self._socket.wait_closed()
+        return self._socket.close_code or 1006
+
+    async def close(self) -> None:
+        """End the connection without a word."""
+        if self._socket is not None:
+            await self._socket.close()
+        if self._reader is not None:
+            await self._reader
+
+    async def _listen(self, socket: ClientConnection) -> None:
+        try:
+            async for payload in socket:
+                came_us = self._device_us()
+                try:
+                    frame = from_gateway(payload)
+                except WireError:
+                    continue
+                if isinstance(frame, ClockAsk):
+                    answer = ClockAnswer(id=frame.id, came_us=came_us, left_us=self._device_us())
+                    await socket.send(encode(answer))
+                elif isinstance(frame, Refused):
+                    self.refused = frame
+        except ConnectionClosed:
+            return

@@ -1,0 +1,134 @@
+import json
+import socket
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+
+import pytest
+
+from brachium_nodes.gateway import GatewaySettings, run
+from brachium_nodes.roster import NodeEntry
+from brachium_wire import keys
+from brachium_wire.bus import Bus
+from brachium_wire.codec import WireError, decode_topic
+from brachium_wire.messages import Health
+
+DEADLINE_S = 15.0
+ROOM = "test"
+
+ROUTER = """
+import json, sys, zenoh
+with zenoh.open(zenoh.Config.from_json5(sys.argv[1])):
+    print("ready", flush=True)
+    sys.stdin.read()
+"""
+
+
+def until(condition: Callable[[], object], what: str) -> None:
+    deadline = time.monotonic() + DEADLINE_S
+    pause = threading.Event()
+    while not condition():
+        assert time.monotonic() < deadline, f"waited {DEADLINE_S:g} s for: {what}"
+        pause.wait(0.01)
+
+
+def free_port() -> int:
+    with socket.socket() as s:
+        s.bind(("127.0.0.1", 0))
+        return int(s.getsockname()[1])
+
+
+@pytest.fixture(scope="session")
+def endpoint() -> Iterator[str]:
+    where = f"tcp/127.0.0.1:{free_port()}"
+    config = {
+        "mode": "router",
+        "listen": {"endpoints": [where]},
+        "scouting": {"multicast": {"enabled": False}, "gossip": {"enabled": False}, "delay": 0},
+        "transport": {"shared_memory": {"enabled": False}},
+    }
+    command = [sys.executable, "-c", ROUTER, json.dumps(config)]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as process:
+        assert process.stdout is not None
+        assert process.stdout.readline() == b"ready\n"
+        yield where
+        assert process.stdin is not None
+        process.stdin.close()
+        process.wait(timeout=5)
+
+
+@pytest.fixture
+def bus(endpoint: str) -> Iterator[Bus]:
+    with Bus.open(endpoint) as bus:
+        yield bus
+
+
+class Listener:
+    """Everything that the room said since it was made."""
+
+    def __init__(self, bus: Bus, room: str = ROOM) -> None:
+        self._inbox = bus.subscribe(keys.everything(room))
+        self.heard: list[tuple[keys.Key, object]] = []
+
+    def of(self, topic: str, detail: str | None = None) -> list:
+        for key, payload in self._inbox.drain():
+            parsed = keys.parse(key)
+            try:
+                self.heard.append((parsed, decode_topic(payload, parsed.topic)))
+            except WireError as error:
+                raise AssertionError(f"{key}: {error}") from error
+        return [m for k, m in self.heard if k.topic == topic and detail in (None, k.detail)]
+
+
+@pytest.fixture
+def listener(bus: Bus) -> Listener:
+    return Listener(bus)
+
+
+class Running:
+    """A gateway in a thread."""
+
+    def __init__(self, settings: GatewaySettings, bus: Bus) -> None:
+        self.stop = threading.Event()
+        self.error: Exception | None = None
+        self._inbox = bus.subscribe(keys.service(settings.room, "gateway", settings.id))
+        self._thread = threading.Thread(target=self._run, args=(settings,))
+        self._thread.start()
+        self.url = ""
+        until(self._listening, f"gateway {settings.id} listening")
+
+    def _run(self, settings: GatewaySettings) -> None:
+        try:
+            run(settings, self.stop)
+        except Exception as error:
+            self.error = error
+
+    def _listening(self) -> bool:
+        assert self.error is None, self.error
+        for _, payload in self._inbox.drain():
+            health = decode_topic(payload, "health")
+            assert isinstance(health, Health)
+            self.url = health.text
+        return bool(self.url)
+
+    def end(self) -> None:
+        self.stop.set()
+        self._thread.join(timeout=5)
+        assert not self._thread.is_alive(), "the gateway did not end within 5 s"
+        assert self.error is None, self.error
+
+
+@pytest.fixture
+def gateway(endpoint: str, bus: Bus) -> Iterator[Callable[..., Running]]:
+    running: list[Running] = []
+
+    def start(*nodes: NodeEntry, id: str = "gw-a", **more: object) -> Running:
+        settings = GatewaySettings(endpoint=endpoint, room=ROOM, id=id, port=0, nodes=nodes, **more)
+        running.append(Running(settings, bus))
+        return running[-1]
+
+    yield start
+    for one in running:
+        one.end()
