@@ -1,0 +1,37 @@
+"""Run fusion: sensor samples in, skeletons out.
+
+brachium fuse --filter vqf --rate 50
+"""
+
+import argparse
+
+from brachium.shell import add_network, serve
+
+
+def configure(parser: argparse.ArgumentParser) -> None:
+    """Add fusion's options."""
+    add_network(parser)
+    parser.add_argument("--id", default="fusion", help="this service's name (default: %(default)s)")
+    parser.add_argument("--filter", default="auto", help="auto, vqf, complementary or complementary-printed")
+    parser.add_argument("--no-mag", action="store_true", help="leave magnetometers aside")
+    parser.add_argument(
+        "--rate", type=float, default=50.0, metavar="HZ", help="skeletons a second (default: 50)"
+    )
+    parser.add_argument("--no-auto-pose", action="store_true", help="calibrate only when asked to")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Start fusion."""
+    from brachium_fusion import service
+    from brachium_fusion.subject import Settings
+
+    pipeline = Settings(
+        filter=args.filter,
+        magnetometer=not args.no_mag,
+        rate_hz=args.rate,
+        auto_pose=not args.no_auto_pose,
+    )
+    settings = service.FuseSettings(
+        endpoint=args.endpoint, room=args.room, service_id=args.id, pipeline=pipeline
+    )
+    return serve(lambda stop: service.run(settings, stop))

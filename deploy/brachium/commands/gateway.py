@@ -1,0 +1,92 @@
+"""Run the door for wearables, or assign a wearable to a segment of a subject while it runs.
+
+brachium gateway --site lan.toml
+  brachium gateway --assign esp-3f21=p01/forearm_r
+"""
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from brachium.shell import Failed, Usage, add_network, serve
+
+if TYPE_CHECKING:
+    from brachium_nodes.roster import NodeEntry
+
+
+def configure(parser: argparse.ArgumentParser) -> None:
+    """Add the gateway's options."""
+    add_network(parser)
+    parser.add_argument(
+        "--id", default="gateway", help="names the service and its clock (default: %(default)s)"
+    )
+    parser.add_argument("--bind", default="127.0.0.1", help="address of one interface (default: %(default)s)")
+    parser.add_argument("--port", type=int, default=8765, help="0 takes any free one (default: %(default)s)")
+    parser.add_argument("--site", type=Path, metavar="FILE.toml", help="the nodes of this site file may join")
+    parser.add_argument(
+        "--join-token-sha256", metavar="HEX", help="nodes with this token may knock and wait to be assigned"
+    )
+    parser.add_argument(
+        "--assign",
+        metavar="ID=SUBJECT/SEGMENT",
+        help="tell the running gateway whom a node belongs to, and end",
+    )
+
+
+def run(args: argparse.Namespace) -> int:
+    """Start the gateway, or assign."""
+    if args.assign is not None:
+        _assign(args)
+        return 0
+    from brachium_nodes import gateway
+
+    settings = gateway.GatewaySettings(
+        endpoint=args.endpoint,
+        room=args.room,
+        id=args.id,
+        bind=args.bind,
+        port=args.port,
+        nodes=_entries(args.site),
+        join_token_sha256=args.join_token_sha256,
+    )
+    return serve(lambda stop: gateway.run(settings, stop))
+
+
+def _entries(site: Path | None) -> "tuple[NodeEntry, ...]":
+    if site is None:
+        return ()
+    from brachium import site_file
+    from brachium_nodes.roster import NodeEntry
+
+    return tuple(
+        NodeEntry(
+            id=node.id,
+            token_sha256=node.token_sha256,
+            subject=node.subject,
+            segment=node.segment,
+            mounting=node.mounting,
+        )
+        for node in site_file.read(site_file.find(str(site))).node
+    )
+
+
+def _assign(args: argparse.Namespace) -> None:
+    from brachium_wire import keys
+    from brachium_wire.bus import Bus
+    from brachium_wire.codec import decode, encode
+    from brachium_wire.messages import Answer, Command
+
+    node, _, place = args.assign.partition("=")
+    subject, _, segment = place.partition("/")
+    if not (node and subject and segment):
+        raise Usage(f"--assign takes ID=SUBJECT/SEGMENT, as in esp-3f21=p01/forearm_r; came {args.assign!r}")
+    keys.chunk(segment, "segment")
+    with Bus.open(args.endpoint) as bus:
+        question = encode(Command(arguments={"id": node, "segment": segment}))
+        reply = bus.ask(keys.command(args.room, subject, "assign"), question)
+    if reply is None:
+        raise Failed(f"no gateway of room {args.room} answered; is it running?")
+    answer = decode(reply, Answer)
+    if not answer.ok:
+        raise Failed(answer.reason)
+    print(f"{node} is now {segment} of {subject}")
