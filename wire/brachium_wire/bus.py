@@ -123,6 +123,7 @@ class Bus:
         self._session = session
         self.endpoint = endpoint
         self._lock = threading.Lock()
+        self._declaring = threading.Lock()
         self._retaining = threading.Lock()
         self._closed = False
         self._publishers: dict[str, zenoh.Publisher] = {}
@@ -181,17 +182,18 @@ class Bus:
         row = TOPICS.get(keys.parse(key).topic)
         if row is None:
             raise keys.BadKey(f"nothing is put on {key!r}: it is a token or a query")
-        publisher = self._session.declare_publisher(
-            key,
-            priority=_PRIORITY[row.urgency],
-            congestion_control=zenoh.CongestionControl.DROP,
-            express=False,
-        )
-        # No lock while Zenoh declares; of two made at once the second, still unused, goes.
-        first = self._publishers.setdefault(key, publisher)
-        if first is not publisher:
-            publisher.undeclare()  # type: ignore[no-untyped-call]  # as Zenoh types it
-        return first
+        # One at a time: of two publishers that a session declares for one key at once, one loses what is
+        # put on it. Declaring waits for nobody, so a callback that waits here does not hold up the session.
+        with self._declaring:
+            publisher = self._publishers.get(key)
+            if publisher is None:
+                publisher = self._publishers[key] = self._session.declare_publisher(
+                    key,
+                    priority=_PRIORITY[row.urgency],
+                    congestion_control=zenoh.CongestionControl.DROP,
+                    express=False,
+                )
+        return publisher
 
     def retain(self, key: str, payload: bytes) -> None:
         """Publish on a key and answer who asks for it later with the last value, as long as this bus is open.
