@@ -1,0 +1,156 @@
+"""The live view: skeletons of a room on a screen, in a window or in a browser on this machine."""
+
+import importlib.util
+import logging
+import os
+import threading
+import time
+import webbrowser
+from collections import Counter
+from collections.abc import Callable
+from contextlib import ExitStack
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from brachium_viewer.picture import Picture
+from brachium_viewer.viewer_process import ViewerProcess, ViewError, free_port
+from brachium_viewer.web_view import PageServer
+from brachium_wire import keys
+from brachium_wire.bus import DEFAULT_ENDPOINT, Bus, Inbox
+from brachium_wire.codec import WireError, decode_topic
+from brachium_wire.heart import Heart
+
+if TYPE_CHECKING:
+    from brachium_viewer.screen import Screen
+
+log = logging.getLogger(__name__)
+
+TICK_S = 1.0 / 30.0
+_TAILS = ("skeleton/*", "truth/*", "imu/*/status", "calibration")
+_INBOX = 4096
+
+
+@dataclass(frozen=True, kw_only=True)
+class ViewSettings:
+    """What to show, and where."""
+
+    endpoint: str = DEFAULT_ENDPOINT
+    room: str = "lab"
+    subject: str = "*"
+    web: bool | None = None
+    """In a browser; None: in a window if there is a display, else in a browser."""
+    web_port: int = 9090
+    """Port of the page on loopback; 0 takes any free one."""
+    grpc_port: int = 9876
+    """Port of the stream on loopback; 0 takes any free one."""
+    memory_limit: str = "256MB"
+    """What the viewer and its server may keep of the past; the oldest goes first."""
+    open_browser: bool = False
+    on_address: Callable[[str], None] | None = None
+    """Called with the page's address when it can be opened."""
+
+
+def run(settings: ViewSettings, stop: threading.Event) -> None:
+    """Show the room until `stop` is set or the window is closed.
+
+    Raises ViewError when Rerun is missing, a port is taken or the viewer fails, NoRouter without a router; each
+    says in one line what to do.
+    """
+    if importlib.util.find_spec("rerun") is None:
+        raise ViewError("the live view needs Rerun: pip install 'brachium[view]'")
+    web = settings.web if settings.web is not None else not _has_display()
+    with ExitStack() as stack:
+        bus = stack.enter_context(Bus.open(settings.endpoint, stop=stop))
+        heart = Heart(bus, settings.room, "view", f"view-{os.getpid()}")
+        inboxes = [
+            bus.subscribe(keys.subjects(settings.room, tail, settings.subject), _INBOX) for tail in _TAILS
+        ]
+        grpc_port = free_port(settings.grpc_port, "the viewer's stream")
+        files_port = free_port(0, "the viewer's files") if web else None
+        viewer = stack.enter_context(
+            ViewerProcess(grpc_port=grpc_port, memory_limit=settings.memory_limit, web_files_port=files_port)
+        )
+        viewer.wait_ready(stop)
+        heart.text = "in a window"
+        if files_port is not None:
+            page = PageServer(port=settings.web_port, grpc_port=grpc_port, viewer_files_port=files_port)
+            stack.enter_context(page)
+            heart.text = page.address
+            _tell(page.address, settings)
+        _show(settings, stop, bus, heart, inboxes, viewer)
+
+
+def _has_display() -> bool:
+    return bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
+
+
+def _tell(address: str, settings: ViewSettings) -> None:
+    log.info("live view: %s", address)
+    if settings.on_address is not None:
+        settings.on_address(address)
+    if settings.open_browser:
+        webbrowser.open(address)
+
+
+def _show(
+    settings: ViewSettings,
+    stop: threading.Event,
+    bus: Bus,
+    heart: Heart,
+    inboxes: list[Inbox],
+    viewer: ViewerProcess,
+) -> None:
+    import rerun as rr
+
+    from brachium_viewer.screen import APPLICATION, Screen
+
+    recording = rr.RecordingStream(APPLICATION, recording_id=f"{settings.room}-{time.time_ns()}")
+    recording.connect_grpc(viewer.url)
+    screen = Screen(recording)
+    picture = Picture()
+    start_s = time.monotonic()
+    retained = bus.fetch(keys.subjects(settings.room, "calibration", settings.subject))
+    try:
+        while not stop.is_set() and viewer.running() and screen.error is None:
+            due_s = time.monotonic() + TICK_S
+            news = retained + [item for inbox in inboxes for item in inbox.drain()]
+            retained = []
+            draw(newest(news), picture, screen, time.monotonic() - start_s, heart.drops)
+            heart.counts["received"] = sum(inbox.received for inbox in inboxes)
+            heart.counts["overflow"] = sum(inbox.dropped for inbox in inboxes)
+            heart.counts["delivered"] = screen.delivered
+            heart.counts["replaced"] = screen.mailbox.replaced
+            heart.beat()
+            stop.wait(max(0.0, due_s - time.monotonic()))
+        if screen.error is not None:
+            raise screen.error
+        if not stop.is_set() and viewer.code:
+            raise ViewError(f"the viewer ended with code {viewer.code}: {viewer.last_words()}")
+        log.info("the live view ends: %s", "stopped" if stop.is_set() else "its window was closed")
+    finally:
+        screen.close(0.5)  # a frozen viewer does not let the thread end; its death, next, does
+
+
+def newest(messages: list[tuple[str, bytes]]) -> dict[str, bytes]:
+    """Return the last payload of each key: a view shows what is, not all that was."""
+    return dict(messages)
+
+
+def draw(
+    news: dict[str, bytes], picture: Picture, screen: "Screen", now_s: float, drops: Counter[str]
+) -> None:
+    """Put one tick's news on the screen; what cannot be read is counted by its reason."""
+    for key, payload in news.items():
+        try:
+            where = keys.parse(key)
+            moment = picture.feed(
+                where.subject, where.topic, where.detail, decode_topic(payload, where.topic), now_s
+            )
+        except (WireError, keys.BadKey) as error:
+            drops[error.drop.value if isinstance(error, WireError) else "bad_key"] += 1
+            continue
+        if moment is not None:
+            screen.mailbox.put(*moment)
+    due = picture.tick(now_s)
+    if due:
+        screen.mailbox.put(now_s, due)

@@ -1,0 +1,73 @@
+"""The words beside the picture, as Markdown: whose arm it is, what it rests on, how its sensors fare."""
+
+from collections.abc import Mapping
+
+from brachium_wire.messages import Calibration, Forward, Origin, Skeleton, Status
+
+KEY = "Plots: coloured = estimate, white = truth of an emulated wearer, grey = AAOS reference."
+NOT_A_DEVICE = "Brachium is a measuring and research tool, not a medical device."
+ORIGIN: Mapping[Origin, str] = {
+    "worn": "worn by a person",
+    "emulated": "EMULATED WEARER, nobody is measured",
+    "playback": "PLAYBACK of a recording, not live",
+}
+SHORT_ORIGIN: Mapping[Origin, str] = {"worn": "", "emulated": "emulated wearer", "playback": "playback"}
+FORWARD: Mapping[Forward, str] = {
+    "sternum": "from the sternum sensor",
+    "elbow": "from the elbow's axis",
+    "facing": "from the stated facing, by magnetometer",
+    "mounting": "from how the upper arm's sensor is worn",
+    "none": "**not known**: assumed",
+}
+
+
+def describe(
+    subject: str,
+    skeletons: Mapping[str, Skeleton],
+    calibration: Calibration | None,
+    statuses: Mapping[str, Status],
+    *,
+    silent: bool,
+) -> str:
+    """Return the panel of one subject; `skeletons` by side, `statuses` by segment."""
+    newest = next(iter(skeletons.values()))
+    lines = [f"### {subject}: {ORIGIN[newest.origin]}", ""]
+    if silent:
+        lines.append("**No skeleton arrives any more.** The last pose is shown in grey.\n")
+    lines.append(f"- Forward: {FORWARD[newest.forward]}")
+    lines.append(f"- Calibration: {_calibration(calibration)}")
+    assumed = sorted({name for skeleton in skeletons.values() for name in skeleton.assumed})
+    if assumed:
+        lines.append(f"- Not plainly measured: {', '.join(name.replace('_', ' ') for name in assumed)}")
+    lines += [f"- {warning}" for warning in (calibration.warnings if calibration else [])]
+    if statuses:
+        lines += ["", "| sensor | samples/s | lost | battery | signal |", "|---|---|---|---|---|"]
+        lines += [_sensor(segment, statuses[segment]) for segment in sorted(statuses)]
+    return "\n".join(lines)
+
+
+def _calibration(calibration: Calibration | None) -> str:
+    if calibration is None or calibration.state == "none":
+        return "**none yet**"
+    text = {
+        "waiting": "waiting",
+        "running": f"running, {100 * calibration.progress:.0f} %",
+        "done": "done",
+        "refused": "**refused**",
+    }[calibration.state]
+    if calibration.pose:
+        text += f" ({calibration.pose})"
+    return text + (f": {calibration.reason}" if calibration.reason else "")
+
+
+def _sensor(segment: str, status: Status) -> str:
+    asked = status.received + status.lost
+    lost = f"{100 * status.lost / asked:.2f} %" if asked else "–"
+    cells = (
+        segment.replace("_", " ") if status.connected else f"**{segment.replace('_', ' ')}: gone**",
+        "–" if status.rate_hz is None else f"{status.rate_hz:.0f}",
+        lost,
+        "–" if status.battery_v is None else f"{status.battery_v:.2f} V",
+        "–" if status.rssi_dbm is None else f"{status.rssi_dbm:.0f} dBm",
+    )
+    return "| " + " | ".join(cells) + " |"

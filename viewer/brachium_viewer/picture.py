@@ -1,0 +1,153 @@
+"""What the live view knows at a moment, and what it therefore draws: messages and times in, drawings out."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+from brachium_viewer import panel
+from brachium_viewer.scene import (
+    CHEST_HEIGHT,
+    PLOTS,
+    Arm,
+    Drawing,
+    Label,
+    Layout,
+    Range,
+    Text,
+    draw_body,
+    draw_silence,
+    draw_skeleton,
+    lean,
+    place_of,
+)
+from brachium_wire.messages import Calibration, Message, Skeleton, Status
+from brachium_wire.topics import TOPICS
+
+SILENT_S = TOPICS["skeleton"].stale_after_s or 0.5
+SETTLE_S = 1.0
+"""Panels are arranged anew this long after the last arm or angle came, so that they do not jump."""
+SLOW_S = 1.0
+"""Words and reference lines are drawn this often."""
+ANCHOR_S = 1.0
+"""A stream whose time and arrival drift further apart than this is anchored again."""
+
+Moment = tuple[float, dict[str, Drawing]]
+"""Seconds since the view began, and what is drawn then."""
+
+
+@dataclass(slots=True)
+class _Subject:
+    place: float
+    skeletons: dict[str, Skeleton] = field(default_factory=dict)
+    truths: dict[str, Skeleton] = field(default_factory=dict)
+    heard_s: dict[tuple[str, bool], float] = field(default_factory=dict)
+    silent: set[tuple[str, bool]] = field(default_factory=set)
+    calibration: Calibration | None = None
+    statuses: dict[str, Status] = field(default_factory=dict)
+    offset_s: float | None = None
+    body_lean: tuple[float, ...] = ()
+
+
+class Picture:
+    """Feed it with messages, and ask it often for what time alone changes. Times are s since the view began."""
+
+    def __init__(self) -> None:
+        self._subjects: dict[str, _Subject] = {}
+        self._calibrations: dict[str, Calibration] = {}
+        self._arms: list[Arm] = []
+        self._angles: set[str] = set()
+        self._arranged: Layout | None = None
+        self._changed_s = 0.0
+        self._slow_s = -SLOW_S
+
+    def feed(self, subject: str, topic: str, detail: str, message: Message, now_s: float) -> Moment | None:
+        """Take one message; return what it changes in the picture and the moment it belongs to."""
+        if isinstance(message, Skeleton):
+            return self._skeleton(subject, message, topic == "truth", now_s)
+        if isinstance(message, Calibration):
+            self._calibrations[subject] = message
+        elif isinstance(message, Status) and subject in self._subjects:
+            self._subjects[subject].statuses[detail] = message
+        return None
+
+    def tick(self, now_s: float) -> dict[str, Drawing]:
+        """Return what is due at this moment: streams that fell silent, words, reference lines, the layout."""
+        out: dict[str, Drawing] = {}
+        for name, subject in self._subjects.items():
+            for (side, truth), heard_s in subject.heard_s.items():
+                if now_s - heard_s > SILENT_S and (side, truth) not in subject.silent:
+                    subject.silent.add((side, truth))
+                    last = (subject.truths if truth else subject.skeletons)[side]
+                    out |= draw_silence(name, last, subject.place, truth=truth)
+        if self._arms and now_s - self._slow_s >= SLOW_S:
+            self._slow_s = now_s
+            out |= dict(self._words())
+            out |= {
+                f"angles/{p.angle}/reference": Range(p.low, p.high) for p in PLOTS if p.angle in self._angles
+            }
+        layout = Layout(
+            tuple(self._arms), tuple(p.angle for p in PLOTS if p.angle in self._angles), self._title()
+        )
+        if (
+            self._arms
+            and layout != self._arranged
+            and (self._arranged is None or now_s - self._changed_s > SETTLE_S)
+        ):
+            self._arranged = layout
+            out["layout"] = layout
+        return out
+
+    def _skeleton(self, name: str, skeleton: Skeleton, truth: bool, now_s: float) -> Moment:
+        subject = self._subjects.setdefault(name, _Subject(place_of(len(self._subjects))))
+        arm = Arm(name, skeleton.side, truth)
+        if arm not in self._arms:
+            self._arms.append(arm)
+            self._changed_s = now_s
+        if not skeleton.angles.keys() <= self._angles:
+            self._angles |= skeleton.angles.keys()
+            self._changed_s = now_s
+        (subject.truths if truth else subject.skeletons)[skeleton.side] = skeleton
+        subject.heard_s[skeleton.side, truth] = now_s
+        subject.silent.discard((skeleton.side, truth))
+        drawings = draw_skeleton(name, skeleton, subject.place, truth=truth)
+        if not truth or not subject.skeletons:
+            drawings |= self._body(name, subject, skeleton)
+        return self._moment(subject, skeleton, now_s), drawings
+
+    def _body(self, name: str, subject: _Subject, skeleton: Skeleton) -> Iterator[tuple[str, Drawing]]:
+        tilt = tuple(round(float(x), 3) for x in lean(skeleton))
+        if tilt != subject.body_lean:
+            subject.body_lean = tilt
+            yield f"world/{name}/body", draw_body(skeleton, subject.place)
+
+    def _moment(self, subject: _Subject, skeleton: Skeleton, now_s: float) -> float:
+        """Measured time, moved once so that subjects and recordings of other days share one axis."""
+        time_s = skeleton.time_ns * 1e-9
+        if subject.offset_s is None or abs(now_s - subject.offset_s - time_s) > ANCHOR_S:
+            subject.offset_s = now_s - time_s
+        return time_s + subject.offset_s
+
+    def _words(self) -> Iterator[tuple[str, Drawing]]:
+        sections = []
+        for name, subject in self._subjects.items():
+            newest = next(iter((subject.skeletons or subject.truths).values()))
+            words = f"{name}: {panel.SHORT_ORIGIN[newest.origin]}".rstrip(": ")
+            yield f"world/{name}/name", Label((subject.place, 0.0, CHEST_HEIGHT + 0.44), words)
+            sections.append(
+                panel.describe(
+                    name,
+                    subject.skeletons or subject.truths,
+                    self._calibrations.get(name),
+                    subject.statuses,
+                    silent=bool(subject.silent),
+                )
+            )
+        yield "words", Text("\n\n".join([*sections, panel.KEY, f"*{panel.NOT_A_DEVICE}*"]))
+
+    def _title(self) -> str:
+        origins = {
+            skeleton.origin
+            for subject in self._subjects.values()
+            for skeleton in (subject.skeletons or subject.truths).values()
+        }
+        words = [panel.SHORT_ORIGIN[origin] for origin in sorted(origins) if panel.SHORT_ORIGIN[origin]]
+        return "Arm" + (f" ({', '.join(words)})" if words else "")

@@ -1,0 +1,287 @@
+"""What the live view draws: messages in, named drawings out. Knows no network, no clock and no viewer.
+
+The picture is in metres, z up, x to the subject's right, y forward, the floor at z = 0. Every subject stands at
+its own place on the x axis and faces forward, whatever its heading in the room; a trunk that leans is drawn
+leaning. What is not known is not drawn, and what is doubtful is grey.
+"""
+
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from brachium_body import rotation
+from brachium_wire.messages import Quality, Skeleton
+
+Floats = npt.NDArray[np.float64]
+Colour = tuple[int, int, int, int]
+
+CHEST_HEIGHT = 1.38
+"""m above the floor, for a figure of about 1.75 m: the view shows a pose, not a body's height."""
+HIP = np.array([0.0, 0.0, -0.46])
+"""Where a leaning trunk turns, in trunk axes."""
+SPACING = 1.5
+"""m between subjects."""
+
+# Okabe and Ito's palette: told apart with every common colour blindness, and in order of brightness too.
+ORANGE, SKY, GREEN, YELLOW = (230, 159, 0, 255), (86, 180, 233, 255), (0, 158, 115, 255), (240, 228, 66, 255)
+BLUE, VERMILION, PURPLE, GREY = (
+    (0, 114, 178, 255),
+    (213, 94, 0, 255),
+    (204, 121, 167, 255),
+    (150, 150, 155, 255),
+)
+BODY: Colour = (98, 104, 112, 255)
+TRUTH: Colour = (255, 255, 255, 130)
+JOINT: Colour = (236, 238, 240, 255)
+PART_COLOUR: Mapping[str, Colour] = {"upper_arm": ORANGE, "forearm": SKY, "hand": GREEN}
+ARM_COLOUR: tuple[Colour, ...] = (SKY, ORANGE, GREEN, PURPLE, YELLOW, VERMILION)
+"""The line of each arm in the plots, in order of appearance."""
+
+QUALITY_COLOUR: Mapping[str, Colour] = {
+    "good": BLUE,
+    "held": ORANGE,
+    "missing": (60, 60, 64, 255),
+    "disturbed": VERMILION,
+    "uncalibrated": YELLOW,
+    "heading_assumed": SKY,
+    "assumed": PURPLE,
+    "silent": (30, 30, 32, 255),
+}
+"""`silent` is the view's own word: no skeleton arrives."""
+_SOLID: frozenset[Quality] = frozenset(("good", "heading_assumed", "uncalibrated", "disturbed"))
+"""Qualities whose orientation is a measurement of now; the others are drawn grey."""
+
+_BONES = (
+    ("upper_arm", "shoulder", "elbow", 0.042),
+    ("forearm", "elbow", "wrist", 0.034),
+    ("hand", "wrist", "hand", 0.030),
+)
+_JOINT_RADIUS = {"shoulder": 0.052, "elbow": 0.043, "wrist": 0.035}
+# The figure, in trunk axes: two ends and a radius, m.
+_TORSO = (
+    # A stack of level capsules: broad chest, waist, hips.
+    *(
+        ((-half, -0.03, height), (half, -0.03, height), 0.092)
+        for height, half in zip(
+            (-0.07, -0.12, -0.17, -0.22, -0.27, -0.32, -0.37, -0.42, -0.47),
+            (0.105, 0.098, 0.088, 0.076, 0.066, 0.062, 0.066, 0.074, 0.078),
+            strict=True,
+        )
+    ),
+    ((-0.16, -0.01, -0.01), (0.16, -0.01, -0.01), 0.050),
+    ((0.0, -0.02, 0.0), (0.0, 0.0, 0.12), 0.048),
+    ((0.0, 0.015, 0.20), (0.0, 0.005, 0.25), 0.085),
+)
+_LEGS = (
+    ((-0.09, -0.03, -0.54), (-0.10, -0.01, -1.28), 0.068),
+    ((0.09, -0.03, -0.54), (0.10, -0.01, -1.28), 0.068),
+    ((-0.10, -0.01, -1.34), (-0.11, 0.12, -1.34), 0.035),
+    ((0.10, -0.01, -1.34), (0.11, 0.12, -1.34), 0.035),
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Plot:
+    """One angle's plot: its column, its title and its AAOS reference range in degrees."""
+
+    angle: str
+    title: str
+    low: float
+    high: float
+
+
+# Source of the ranges: American Academy of Orthopaedic Surgeons. Signs as in docs/conventions.md.
+PLOTS = (
+    Plot(angle="elbow_flexion", title="Elbow flexion", low=0.0, high=150.0),
+    Plot(angle="forearm_pronation", title="Forearm: pronation +, supination −", low=-80.0, high=80.0),
+    Plot(angle="shoulder_flexion", title="Shoulder: flexion +, extension −", low=-60.0, high=180.0),
+    Plot(angle="shoulder_abduction", title="Shoulder abduction", low=0.0, high=180.0),
+    Plot(angle="shoulder_rotation", title="Shoulder: internal +, external −", low=-90.0, high=70.0),
+    Plot(angle="wrist_flexion", title="Wrist: flexion +, extension −", low=-70.0, high=80.0),
+    Plot(angle="wrist_deviation", title="Wrist: ulnar +, radial −", low=-20.0, high=30.0),
+)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Capsules:
+    """Cylinders with round ends; one of length 0 is a ball. All arrays have one row each."""
+
+    starts: Floats
+    """(n, 3) m."""
+    ends: Floats
+    radii: Floats
+    """(n,) m."""
+    colours: npt.NDArray[np.uint8]
+    """(n, 4) red, green, blue, opacity."""
+
+
+@dataclass(frozen=True, slots=True)
+class Degrees:
+    """The value of one line of a plot; None when it is not known, and then the line is broken."""
+
+    value: float | None
+
+
+@dataclass(frozen=True, slots=True)
+class Lane:
+    """The quality that a lane shows from now on."""
+
+    quality: str
+
+
+@dataclass(frozen=True, slots=True)
+class Label:
+    """Words that stand at a point of the picture, m."""
+
+    at: tuple[float, float, float]
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class Range:
+    """A plot's reference range, degrees."""
+
+    low: float
+    high: float
+
+
+@dataclass(frozen=True, slots=True)
+class Text:
+    """A panel of Markdown."""
+
+    markdown: str
+
+
+@dataclass(frozen=True, slots=True)
+class Arm:
+    """One line in every plot."""
+
+    subject: str
+    side: str
+    truth: bool
+
+    @property
+    def path(self) -> str:
+        """The last part of its lines' paths."""
+        return f"{self.subject}_{self.side}" + ("_truth" if self.truth else "")
+
+
+@dataclass(frozen=True, slots=True)
+class Layout:
+    """Who is there and which angles they have: what the panels and the camera follow from."""
+
+    arms: tuple[Arm, ...]
+    angles: tuple[str, ...]
+    title: str
+
+
+Drawing = Capsules | Degrees | Range | Lane | Label | Text | Layout
+
+
+def draw_arm(skeleton: Skeleton, place: float, *, truth: bool = False) -> Capsules:
+    """Return the arm of one skeleton as bones and joints, for a subject who stands at x = `place` m.
+
+    Bones run between the positions that the skeleton has, so their lengths are the measured ones. A segment
+    whose quality is no measurement of now is grey; with `truth` all is pale and translucent.
+    """
+    suffix = "_r" if skeleton.side == "right" else "_l"
+    rows: list[tuple[tuple[float, ...], tuple[float, ...], float, Colour]] = []
+    for part, near, far, radius in _BONES:
+        start, end = skeleton.positions.get(near), skeleton.positions.get(far)
+        if start is None or end is None:
+            continue
+        pose = skeleton.segments.get(part + suffix)
+        known = pose is not None and pose.quality in _SOLID and near not in skeleton.assumed
+        rows.append((start, end, radius, PART_COLOUR[part] if known else GREY))
+        if near in _JOINT_RADIUS:
+            rows.append((start, start, _JOINT_RADIUS[near], JOINT))
+    if truth:
+        rows = [(start, end, 0.8 * radius, TRUTH) for start, end, radius, _ in rows]
+    return _capsules(rows, skeleton, place)
+
+
+def draw_body(skeleton: Skeleton | None, place: float) -> Capsules:
+    """Return torso, neck, head and legs of the figure at x = `place` m; the trunk leans as it does."""
+    trunk = _capsules([(*row, BODY) for row in _TORSO], skeleton, place)
+    legs = _capsules([(*row, BODY) for row in _LEGS], None, place)
+    return Capsules(
+        starts=np.concatenate([trunk.starts, legs.starts]),
+        ends=np.concatenate([trunk.ends, legs.ends]),
+        radii=np.concatenate([trunk.radii, legs.radii]),
+        colours=np.concatenate([trunk.colours, legs.colours]),
+    )
+
+
+def lean(skeleton: Skeleton) -> Floats:
+    """Return the trunk's tilt (4,): picture from trunk, without heading, so that the figure faces forward."""
+    world_from_trunk = rotation.inverse(skeleton.trunk_from_world)
+    return rotation.multiply(rotation.about(2, -rotation.heading(world_from_trunk)), world_from_trunk)
+
+
+def angles_deg(skeleton: Skeleton) -> dict[str, Degrees]:
+    """Return every plotted angle in degrees by its column name; one the skeleton does not have is None."""
+    known = skeleton.angles
+    return {p.angle: Degrees(math.degrees(known[p.angle]) if p.angle in known else None) for p in PLOTS}
+
+
+def place_of(number: int) -> float:
+    """Return the x, in m, at which the subject that appeared as `number` (from 0) stands."""
+    return SPACING * number
+
+
+def draw_skeleton(
+    subject: str, skeleton: Skeleton, place: float, *, truth: bool = False
+) -> dict[str, Drawing]:
+    """Return all drawings of one skeleton by their paths.
+
+    world/<subject>/<side>[_truth]              the arm
+    angles/<angle>/<subject>_<side>[_truth]     degrees
+    quality/<subject>/<segment>                 not for the truth
+    """
+    arm = f"{subject}_{skeleton.side}" + ("_truth" if truth else "")
+    side = skeleton.side + ("_truth" if truth else "")
+    out: dict[str, Drawing] = {f"world/{subject}/{side}": draw_arm(skeleton, place, truth=truth)}
+    out.update({f"angles/{angle}/{arm}": value for angle, value in angles_deg(skeleton).items()})
+    if not truth:
+        for segment, pose in skeleton.segments.items():
+            out[f"quality/{subject}/{segment}"] = Lane(pose.quality)
+    return out
+
+
+def draw_silence(
+    subject: str, skeleton: Skeleton, place: float, *, truth: bool = False
+) -> dict[str, Drawing]:
+    """Return what is shown once a stream has stopped: its last pose in grey, lines broken, lanes silent."""
+    drawings = draw_skeleton(subject, skeleton, place, truth=truth)
+    for path, drawing in drawings.items():
+        if isinstance(drawing, Capsules):
+            colours = np.tile(np.array(TRUTH if truth else GREY, dtype=np.uint8), (len(drawing.colours), 1))
+            drawings[path] = Capsules(drawing.starts, drawing.ends, drawing.radii, colours)
+        elif isinstance(drawing, Degrees):
+            drawings[path] = Degrees(None)
+        elif isinstance(drawing, Lane):
+            drawings[path] = Lane("silent")
+    return drawings
+
+
+def _capsules(
+    rows: Iterable[tuple[tuple[float, ...], tuple[float, ...], float, Colour]],
+    skeleton: Skeleton | None,
+    place: float,
+) -> Capsules:
+    rows = list(rows)
+    starts = np.array([row[0] for row in rows], dtype=np.float64).reshape(-1, 3)
+    ends = np.array([row[1] for row in rows], dtype=np.float64).reshape(-1, 3)
+    if skeleton is not None:
+        tilt = lean(skeleton)
+        starts, ends = (HIP + rotation.rotate(tilt, points - HIP) for points in (starts, ends))
+    chest = np.array([place, 0.0, CHEST_HEIGHT])
+    return Capsules(
+        starts=starts + chest,
+        ends=ends + chest,
+        radii=np.array([row[2] for row in rows], dtype=np.float64),
+        colours=np.array([row[3] for row in rows], dtype=np.uint8).reshape(-1, 4),
+    )
