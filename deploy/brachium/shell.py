@@ -13,8 +13,18 @@ from typing import Any, Protocol
 
 DEFAULT_ROOM = "lab"
 
-EXTRAS = {"pyarrow": "parquet", "rerun": "view", "jinja2": "report", "matplotlib": "report", "can": "can"}
+EXTRAS = {
+    "pyarrow": "parquet",
+    "rerun": "view",
+    "jinja2": "report",
+    "matplotlib": "report",
+    "can": "can",
+    "segno": "site",
+}
 """Heavy packages and the extra that brings each."""
+
+PARENT = "BRACHIUM_PARENT"
+"""Variable that names the process whose end a service shall not outlive."""
 
 log = logging.getLogger("brachium")
 
@@ -104,7 +114,17 @@ def stop_on_signals() -> threading.Event:
 
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, asked)
+    parent = os.environ.get(PARENT)
+    if parent is not None:
+        threading.Thread(target=_stop_when_orphaned, args=(int(parent), stop), daemon=True).start()
     return stop
+
+
+def _stop_when_orphaned(parent: int, stop: threading.Event) -> None:
+    """Set `stop` once the process that started us is gone; killed, it cannot end its services itself."""
+    while os.getppid() == parent and not stop.wait(1.0):
+        pass
+    stop.set()
 
 
 def serve(run: Callable[[threading.Event], object]) -> int:
