@@ -1,0 +1,291 @@
+"""The emulated wearer: a moving person with sensors, as a pure function of settings and sample numbers.
+
+True time counts from 0 s, when the wearer stands in neutral. Other pieces, or another order of asking, give
+the same samples bit for bit: they are made in blocks of about one second that depend on the settings alone.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import lru_cache
+from heapq import merge
+from itertools import pairwise
+from math import ceil, sqrt
+
+import numpy as np
+import numpy.typing as npt
+
+from brachium_body import rotation
+from brachium_body.angles import COLUMNS, joint_angles
+from brachium_body.continuation import AngleTracker
+from brachium_body.kinematics import TRUNK_FROM_THORAX
+from brachium_body.segments import SEGMENTS, Segment, Side, arm_segments
+from brachium_nodes.link import EmulatedClock, FaultSettings, Injected, departures
+from brachium_nodes.mounting import Worn
+from brachium_nodes.movement import Array
+from brachium_nodes.person import Person, PersonSettings
+from brachium_nodes.sensors import CHIP, LEVELS, Chip, Level, generator
+from brachium_wire.messages import Quaternion, SegmentPose, SensorCalibration, Skeleton, Vector
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WearerSettings(PersonSettings):
+    """A wearer: the person, the sensors and their level of error."""
+
+    level: Level = "ideal"
+    rate_hz: float = 100.0
+    batch: int = 5
+    """Samples in a packet."""
+    mag_every: int = 1
+    """The magnetometer has a value with every so many samples."""
+    segments: tuple[Segment, ...] = ()
+    """Which segments carry a sensor; empty: upper arm, forearm and hand of the exercising arms."""
+    skew_ppm: float = 30.0
+    """Standard deviation of the nodes' clock rates; crystals of this class are within 50 ppm."""
+
+    def __post_init__(self) -> None:
+        """Raise ValueError for what cannot be emulated."""
+        PersonSettings.__post_init__(self)
+        if self.level not in LEVELS:
+            raise ValueError(f"level {self.level!r} is not known; choose one of {', '.join(LEVELS)}")
+        if not 1.0 <= self.rate_hz <= 1000.0:
+            raise ValueError(f"rate {self.rate_hz} Hz cannot be used; give 1 to 1000 Hz")
+        if not 1 <= self.batch <= 256:
+            raise ValueError(f"batches of {self.batch} samples cannot be used; give 1 to 256")
+        if self.mag_every < 1:
+            raise ValueError(f"a magnetometer with every {self.mag_every} samples cannot be; give 1 or more")
+        for segment in self.segments:
+            if segment not in SEGMENTS:
+                raise ValueError(f"segment {segment!r} is not known; choose of {', '.join(SEGMENTS)}")
+
+    def worn(self) -> tuple[Segment, ...]:
+        """Return the segments that carry a sensor."""
+        if self.segments:
+            return self.segments
+        sides: tuple[Side, ...] = ("right", "left") if self.arms == "both" else (self.arms,)
+        return tuple(segment for side in sides for segment in arm_segments(side))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SensorInfo:
+    """What is known of one sensor; the fields of messages.Info that the wearer decides."""
+
+    chip: str
+    rate_hz: float
+    mounting: Quaternion
+    """Nominal segment_from_sensor: the strap sits some degrees away from it."""
+    calibration: SensorCalibration
+    magnetometer: bool = True
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Readings:
+    """Consecutive raw samples of one sensor, in sensor axes."""
+
+    first: int
+    """Number of the first sample."""
+    time_s: Array
+    """(n,) true times."""
+    acc: Array
+    """(n, 3) m/s^2."""
+    gyr: Array
+    """(n, 3) rad/s."""
+    mag: Array
+    """(k, 3) uT."""
+    mag_index: npt.NDArray[np.int64]
+    """(k,) which of the n samples `mag` belongs to."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Truth:
+    """What one arm really does at n instants; numbers as messages.Skeleton has them."""
+
+    trunk_from_world: Array
+    world_from_segment: dict[str, Array]
+    """By segment, with the sternum: (n, 4)."""
+    positions: dict[str, Array]
+    """shoulder, elbow, wrist, hand in trunk axes from the chest: (n, 3) m."""
+    angles: Array
+    """(n, len(angles.COLUMNS)) rad, in principal ranges."""
+    thorax_from_upper_arm: Array
+    shoulder_shift: Array
+    """(n, 3) m in trunk axes."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Packet:
+    """A packet of one sensor, as it reaches the gateway."""
+
+    segment: Segment
+    send_time_s: float
+    """True time at which to hand it over."""
+    sequence: int
+    """Number of its first sample."""
+    device_us: npt.NDArray[np.int64]
+    """(n,) the node's clock at each sample."""
+    readings: Readings
+    injected: Injected
+    """What was done to this sensor's stream so far, this packet included."""
+
+
+class Wearer:
+    """An emulated wearer. Its methods are pure: blocks and walks are kept for speed alone."""
+
+    def __init__(self, settings: WearerSettings) -> None:
+        self.settings = settings
+        self.person = Person(settings)
+        self.segments = settings.worn()
+        seed, errors = settings.seed, LEVELS[settings.level]
+        self._errors = errors
+        self._worn = {s: Worn.put_on(s, self.person, errors) for s in self.segments}
+        self._chips = {s: Chip.draw(errors, seed, s) for s in self.segments}
+        self.clocks = {
+            s: EmulatedClock.draw(settings.rate_hz, settings.skew_ppm, seed, s) for s in self.segments
+        }
+        self._size = ceil(settings.rate_hz)
+        self._block = lru_cache(maxsize=3 * len(self.segments))(self._make_block)
+        self._walk = lru_cache(maxsize=2 * len(self.segments))(self._make_walk)
+
+    def info(self, segment: Segment) -> SensorInfo:
+        """Return what is known of a segment's sensor."""
+        return SensorInfo(
+            chip=CHIP,
+            rate_hz=self.settings.rate_hz,
+            mounting=self._worn[segment].place.mounting,
+            calibration=self._chips[segment].calibration,
+        )
+
+    def samples(self, segment: Segment, first: int, count: int) -> Readings:
+        """Return `count` samples of a segment's sensor from number `first` on."""
+        blocks = range(first // self._size, (first + count - 1) // self._size + 1)
+        parts = [self._block(segment, block) for block in blocks]
+        time_s, acc, gyr, mag = (np.concatenate([part[i] for part in parts]) for i in range(4))
+        start = first - blocks[0] * self._size
+        cut = slice(start, start + count)
+        every = self.settings.mag_every
+        index = np.arange(-first % every, count, every)
+        return Readings(first, time_s[cut], acc[cut], gyr[cut], mag[cut][index], index)
+
+    def packets(self, segment: Segment, faults: FaultSettings | None = None) -> Iterator[Packet]:
+        """Yield for ever the packets of one segment's sensor in the order in which they arrive."""
+        clock, n = self.clocks[segment], self.settings.batch
+        ready = clock.sample_time_s(np.array([n - 1, 2 * n - 1])).tolist()
+        for departure in departures(
+            ready[0], ready[1] - ready[0], n, faults or FaultSettings(), self.settings.seed, segment
+        ):
+            readings = self.samples(segment, departure.number * n, n)
+            yield Packet(
+                segment,
+                departure.time_s,
+                readings.first,
+                clock.ticks_us(readings.time_s),
+                readings,
+                departure.injected,
+            )
+
+    def all_packets(self, faults: FaultSettings | None = None) -> Iterator[Packet]:
+        """Yield for ever the packets of all sensors by the time at which they arrive."""
+        return merge(*(self.packets(s, faults) for s in self.segments), key=lambda packet: packet.send_time_s)
+
+    def truth(self, time_s: npt.ArrayLike, side: Side) -> Truth:
+        """Return what one arm really does at true times (n,) s; angles in their principal ranges."""
+        t = np.atleast_1d(np.asarray(time_s, dtype=np.float64))
+        trunk, arm = self.person.trunk(t), self.person.arm(t, side)
+        trunk_from_world = rotation.multiply(TRUNK_FROM_THORAX, rotation.inverse(trunk.world_from_thorax))
+        chain = (trunk.world_from_thorax, *arm.world_from.values())
+        shoulder, elbow, wrist = (
+            rotation.multiply(rotation.inverse(near), far) for near, far in pairwise(chain)
+        )
+        angles = joint_angles(
+            shoulder,
+            elbow,
+            wrist,
+            side,
+            calibration_from_thorax=rotation.multiply(
+                rotation.inverse(TRUNK_FROM_THORAX), trunk.world_from_thorax
+            ),
+            shoulder_shift=arm.shift,
+            chest_to_shoulder=self.person.lengths.chest_to_shoulder,
+        )
+        return Truth(
+            trunk_from_world,
+            dict(zip(("sternum", *arm_segments(side)), chain, strict=True)),
+            {name: rotation.rotate(trunk_from_world, p - trunk.chest) for name, p in arm.joints.items()},
+            angles,
+            shoulder,
+            arm.shift,
+        )
+
+    def skeletons(
+        self, time_s: npt.ArrayLike, side: Side, start_ns: int, tracker: AngleTracker
+    ) -> list[Skeleton]:
+        """Return the truth at true times (n,) s, in order, as messages; true time 0 is host time `start_ns`.
+
+        `tracker` follows one arm; keep it from call to call, so that angles go on without jumps.
+        """
+        tracker.grow(1)
+        t = np.atleast_1d(np.asarray(time_s, dtype=np.float64))
+        truth = self.truth(t, side)
+        row = np.zeros(1, dtype=np.intp)
+        angles = [
+            tracker.step(row, truth.angles[i : i + 1], truth.thorax_from_upper_arm[i : i + 1], side)[0]
+            for i in range(len(t))
+        ]
+        return [
+            _skeleton(truth, i, angles[i], side, start_ns + round(1e9 * at))
+            for i, at in enumerate(t.tolist())
+        ]
+
+    def _make_block(self, segment: Segment, block: int) -> tuple[Array, Array, Array, Array]:
+        """Return time, acc, gyr, mag of one block. It is always made whole, so no cut changes a bit."""
+        index = np.arange(block * self._size, (block + 1) * self._size)
+        t = self.clocks[segment].sample_time_s(index)
+        acc, gyr, mag = self._worn[segment].truth(t, self.person)
+        random = generator(self.settings.seed, segment, "noise", block)
+        drift = self._drift(segment, block)
+        return t, *self._chips[segment].read(acc, gyr, mag, self.settings.rate_hz, drift, random)
+
+    def _drift(self, segment: Segment, block: int) -> Array:
+        """Return where the gyro's bias has walked to, (samples, 3): straight between a block's ends."""
+        page, row = divmod(block, _PAGE)
+        walk = self._walk(segment, page)
+        share = (np.arange(self._size) / self._size)[:, None]
+        drift: Array = walk[row] + share * (walk[row + 1] - walk[row])
+        return drift
+
+    def _make_walk(self, segment: Segment, page: int) -> Array:
+        """Return the walk (_PAGE + 1, 3) rad/s at the ends of a page's blocks."""
+        start = self._walk(segment, page - 1)[-1] if page else np.zeros(3)
+        random = generator(self.settings.seed, segment, "walk", page)
+        size = self._errors.gyro_walk * sqrt(self._size / self.settings.rate_hz)
+        steps = size * random.standard_normal((_PAGE, 3))
+        walk: Array = start + np.concatenate([np.zeros((1, 3)), np.cumsum(steps, axis=0)])
+        return walk
+
+
+_PAGE = 4096
+"""Blocks whose walk is drawn at once: more than an hour."""
+
+
+def _skeleton(truth: Truth, i: int, angles: Array, side: Side, time_ns: int) -> Skeleton:
+    return Skeleton(
+        time_ns=time_ns,
+        side=side,
+        origin="emulated",
+        forward="facing",
+        trunk_from_world=_four(truth.trunk_from_world[i]),
+        segments={
+            name: SegmentPose(quality="good", world_from_segment=_four(q[i]))
+            for name, q in truth.world_from_segment.items()
+        },
+        positions={name: _three(p[i]) for name, p in truth.positions.items()},
+        angles=dict(zip(COLUMNS, angles.tolist(), strict=True)),
+        shoulder_shift=_three(truth.shoulder_shift[i]),
+    )
+
+
+def _three(v: Array) -> Vector:
+    return (float(v[0]), float(v[1]), float(v[2]))
+
+
+def _four(q: Array) -> Quaternion:
+    return (float(q[0]), float(q[1]), float(q[2]), float(q[3]))
