@@ -5,14 +5,13 @@ from typing import Any
 import rerun as rr
 import rerun.blueprint as rrb
 
+from brachium_viewer.drawings import Arm, Layout
 from brachium_viewer.scene import (
     ARM_COLOUR,
     CHEST_HEIGHT,
     PLOTS,
     QUALITY_COLOUR,
     SPACING,
-    Arm,
-    Layout,
     Plot,
 )
 

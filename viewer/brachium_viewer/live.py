@@ -53,8 +53,7 @@ class ViewSettings:
 def run(settings: ViewSettings, stop: threading.Event) -> None:
     """Show the room until `stop` is set or the window is closed.
 
-    Raises ViewError when Rerun is missing, a port is taken or the viewer fails, NoRouter without a router; each
-    says in one line what to do.
+    Raises ViewError when Rerun is missing, a port is taken or the viewer fails, NoRouter without a router.
     """
     if importlib.util.find_spec("rerun") is None:
         raise ViewError("the live view needs Rerun: pip install 'brachium[view]'")

@@ -4,15 +4,10 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 from brachium_viewer import panel
+from brachium_viewer.drawings import Arm, Drawing, Label, Layout, Range, Text
 from brachium_viewer.scene import (
     CHEST_HEIGHT,
     PLOTS,
-    Arm,
-    Drawing,
-    Label,
-    Layout,
-    Range,
-    Text,
     draw_body,
     draw_silence,
     draw_skeleton,
@@ -48,7 +43,7 @@ class _Subject:
 
 
 class Picture:
-    """Feed it with messages, and ask it often for what time alone changes. Times are s since the view began."""
+    """Feed it with messages; ask it often for what time alone changes. Times are s since the view began."""
 
     def __init__(self) -> None:
         self._subjects: dict[str, _Subject] = {}
@@ -144,10 +139,12 @@ class Picture:
         yield "words", Text("\n\n".join([*sections, panel.KEY, f"*{panel.NOT_A_DEVICE}*"]))
 
     def _title(self) -> str:
-        origins = {
-            skeleton.origin
-            for subject in self._subjects.values()
-            for skeleton in (subject.skeletons or subject.truths).values()
-        }
-        words = [panel.SHORT_ORIGIN[origin] for origin in sorted(origins) if panel.SHORT_ORIGIN[origin]]
+        words = sorted(
+            {
+                panel.SHORT_ORIGIN[skeleton.origin]
+                for subject in self._subjects.values()
+                for skeleton in (subject.skeletons or subject.truths).values()
+            }
+            - {""}
+        )
         return "Arm" + (f" ({', '.join(words)})" if words else "")

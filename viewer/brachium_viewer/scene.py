@@ -1,7 +1,7 @@
 """What the live view draws: messages in, named drawings out. Knows no network, no clock and no viewer.
 
-The picture is in metres, z up, x to the subject's right, y forward, the floor at z = 0. Every subject stands at
-its own place on the x axis and faces forward, whatever its heading in the room; a trunk that leans is drawn
+The picture is in metres, z up, x to the subject's right, y forward, the floor at z = 0. Every subject stands
+at its own place on the x axis and faces forward, whatever its heading in the room; a leaning trunk is drawn
 leaning. What is not known is not drawn, and what is doubtful is grey.
 """
 
@@ -10,13 +10,11 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from brachium_body import rotation
+from brachium_body.ranges import REFERENCE
+from brachium_viewer.drawings import Capsules, Colour, Degrees, Drawing, Floats, Lane
 from brachium_wire.messages import Quality, Skeleton
-
-Floats = npt.NDArray[np.float64]
-Colour = tuple[int, int, int, int]
 
 CHEST_HEIGHT = 1.38
 """m above the floor, for a figure of about 1.75 m: the view shows a pose, not a body's height."""
@@ -93,92 +91,21 @@ class Plot:
     high: float
 
 
-# Source of the ranges: American Academy of Orthopaedic Surgeons. Signs as in docs/conventions.md.
+def _plot(angle: str, title: str) -> Plot:
+    low, high = REFERENCE[angle]
+    assert low is not None and high is not None, f"the reference range of {angle} has two ends"
+    return Plot(angle=angle, title=title, low=low, high=high)
+
+
 PLOTS = (
-    Plot(angle="elbow_flexion", title="Elbow flexion", low=0.0, high=150.0),
-    Plot(angle="forearm_pronation", title="Forearm: pronation +, supination −", low=-80.0, high=80.0),
-    Plot(angle="shoulder_flexion", title="Shoulder: flexion +, extension −", low=-60.0, high=180.0),
-    Plot(angle="shoulder_abduction", title="Shoulder abduction", low=0.0, high=180.0),
-    Plot(angle="shoulder_rotation", title="Shoulder: internal +, external −", low=-90.0, high=70.0),
-    Plot(angle="wrist_flexion", title="Wrist: flexion +, extension −", low=-70.0, high=80.0),
-    Plot(angle="wrist_deviation", title="Wrist: ulnar +, radial −", low=-20.0, high=30.0),
+    _plot("elbow_flexion", "Elbow flexion"),
+    _plot("forearm_pronation", "Forearm: pronation +, supination −"),
+    _plot("shoulder_flexion", "Shoulder: flexion +, extension −"),
+    _plot("shoulder_abduction", "Shoulder abduction"),
+    _plot("shoulder_rotation", "Shoulder: internal +, external −"),
+    _plot("wrist_flexion", "Wrist: flexion +, extension −"),
+    _plot("wrist_deviation", "Wrist: ulnar +, radial −"),
 )
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Capsules:
-    """Cylinders with round ends; one of length 0 is a ball. All arrays have one row each."""
-
-    starts: Floats
-    """(n, 3) m."""
-    ends: Floats
-    radii: Floats
-    """(n,) m."""
-    colours: npt.NDArray[np.uint8]
-    """(n, 4) red, green, blue, opacity."""
-
-
-@dataclass(frozen=True, slots=True)
-class Degrees:
-    """The value of one line of a plot; None when it is not known, and then the line is broken."""
-
-    value: float | None
-
-
-@dataclass(frozen=True, slots=True)
-class Lane:
-    """The quality that a lane shows from now on."""
-
-    quality: str
-
-
-@dataclass(frozen=True, slots=True)
-class Label:
-    """Words that stand at a point of the picture, m."""
-
-    at: tuple[float, float, float]
-    text: str
-
-
-@dataclass(frozen=True, slots=True)
-class Range:
-    """A plot's reference range, degrees."""
-
-    low: float
-    high: float
-
-
-@dataclass(frozen=True, slots=True)
-class Text:
-    """A panel of Markdown."""
-
-    markdown: str
-
-
-@dataclass(frozen=True, slots=True)
-class Arm:
-    """One line in every plot."""
-
-    subject: str
-    side: str
-    truth: bool
-
-    @property
-    def path(self) -> str:
-        """The last part of its lines' paths."""
-        return f"{self.subject}_{self.side}" + ("_truth" if self.truth else "")
-
-
-@dataclass(frozen=True, slots=True)
-class Layout:
-    """Who is there and which angles they have: what the panels and the camera follow from."""
-
-    arms: tuple[Arm, ...]
-    angles: tuple[str, ...]
-    title: str
-
-
-Drawing = Capsules | Degrees | Range | Lane | Label | Text | Layout
 
 
 def draw_arm(skeleton: Skeleton, place: float, *, truth: bool = False) -> Capsules:

@@ -9,7 +9,7 @@ import rerun as rr
 
 from brachium_body import rotation
 from brachium_viewer import layout
-from brachium_viewer.scene import Capsules, Degrees, Drawing, Label, Lane, Layout, Range, Text
+from brachium_viewer.drawings import Capsules, Degrees, Drawing, Label, Lane, Layout, Range, Text
 
 log = logging.getLogger(__name__)
 
