@@ -21,17 +21,16 @@ def normalize(q: npt.ArrayLike) -> Array:
 
 def multiply(p: npt.ArrayLike, q: npt.ArrayLike) -> Array:
     """Return the Hamilton product p q of (..., 4) arrays: first q, then p."""
-    pw, px, py, pz = np.moveaxis(np.asarray(p, dtype=np.float64), -1, 0)
-    qw, qx, qy, qz = np.moveaxis(np.asarray(q, dtype=np.float64), -1, 0)
-    return np.stack(
-        [
-            pw * qw - px * qx - py * qy - pz * qz,
-            pw * qx + px * qw + py * qz - pz * qy,
-            pw * qy - px * qz + py * qw + pz * qx,
-            pw * qz + px * qy - py * qx + pz * qw,
-        ],
-        axis=-1,
-    )
+    p, q = np.asarray(p, dtype=np.float64), np.asarray(q, dtype=np.float64)
+    pw, px, py, pz = p[..., 0], p[..., 1], p[..., 2], p[..., 3]
+    qw, qx, qy, qz = q[..., 0], q[..., 1], q[..., 2], q[..., 3]
+    w = pw * qw - px * qx - py * qy - pz * qz
+    product = np.empty((*w.shape, 4))
+    product[..., 0] = w
+    product[..., 1] = pw * qx + px * qw + py * qz - pz * qy
+    product[..., 2] = pw * qy - px * qz + py * qw + pz * qx
+    product[..., 3] = pw * qz + px * qy - py * qx + pz * qw
+    return product
 
 
 _CONJUGATE: Array = np.array([1.0, -1.0, -1.0, -1.0])
