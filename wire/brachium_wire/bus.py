@@ -7,6 +7,7 @@ program loses its own oldest messages, counts them, and holds nobody up.
 
 import json
 import logging
+import os
 import re
 import threading
 import time
@@ -42,7 +43,13 @@ class NoRouter(RuntimeError):
     """No router answered at the endpoint, or nothing can be an endpoint that is written so."""
 
 
-def client_config(endpoint: str) -> zenoh.Config:
+ROOM_USER = "room"
+"""The user all programs of a room attach as, where the room has a password."""
+PASSWORD_VARIABLE = "BRACHIUM_PASSWORD"
+"""Environment variable with the room's password; a command line would show it to every user of the machine."""
+
+
+def client_config(endpoint: str, password: str | None = None) -> zenoh.Config:
     """Return the configuration of every process but the router: a client that listens nowhere."""
     settings: dict[str, Any] = {
         "mode": "client",
@@ -57,6 +64,8 @@ def client_config(endpoint: str) -> zenoh.Config:
         "scouting": {"multicast": {"enabled": False}, "gossip": {"enabled": False}},
         "transport": {"link": {"tx": {"lease": LEASE_MS}}, "shared_memory": {"enabled": False}},
     }
+    if password:
+        settings["transport"]["auth"] = {"usrpwd": {"user": ROOM_USER, "password": password}}
     return zenoh.Config.from_json5(json.dumps(settings))
 
 
@@ -137,11 +146,14 @@ class Bus:
         *,
         stop: threading.Event | None = None,
         timeout_s: float | None = 10.0,
+        password: str | None = None,
     ) -> Self:
         """Connect to the router, trying again until `timeout_s` (None: for ever) or until `stop` is set.
 
+        A room with a password is given it as `password`, or by the environment (PASSWORD_VARIABLE).
         Raises NoRouter with one line that says what to do.
         """
+        password = password or os.environ.get(PASSWORD_VARIABLE)
         if not _ENDPOINT.fullmatch(endpoint):
             raise NoRouter(f"endpoint {endpoint[:80]!r} cannot be used: write it as tcp/<host>:<port>")
         stop = stop or threading.Event()
@@ -149,7 +161,7 @@ class Bus:
         warned = False
         while not stop.is_set():
             try:
-                return cls(zenoh.open(client_config(endpoint)), endpoint)
+                return cls(zenoh.open(client_config(endpoint, password)), endpoint)
             except zenoh.ZError as error:
                 reason = str(error).split(" at /")[0]
             if deadline is not None and time.monotonic() >= deadline:
