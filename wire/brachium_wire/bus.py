@@ -46,7 +46,7 @@ class NoRouter(RuntimeError):
 ROOM_USER = "room"
 """The user all programs of a room attach as, where the room has a password."""
 PASSWORD_VARIABLE = "BRACHIUM_PASSWORD"
-"""Environment variable with the room's password; a command line would show it to every user of the machine."""
+"""Environment variable with the room's password: a command line would show it to every user."""
 
 
 def client_config(endpoint: str, password: str | None = None) -> zenoh.Config:

@@ -1,0 +1,66 @@
+"""A site file to the command lines of its services. Pure: nothing is started here."""
+
+import hashlib
+import ipaddress
+from dataclasses import dataclass
+from pathlib import Path
+
+from brachium.site_file import Site, Subject
+from brachium_wire.messages import Session
+
+
+@dataclass(frozen=True, kw_only=True)
+class Service:
+    """One process of a site: its name and its command line after `brachium`."""
+
+    name: str
+    words: list[str]
+
+
+def endpoint(site: Site) -> str:
+    """Return where the site's router listens."""
+    host = f"[{site.room.bind}]" if ":" in site.room.bind else site.room.bind
+    return f"tcp/{host}:{site.room.ports.router}"
+
+
+def wants_password(site: Site) -> bool:
+    """Return whether programs need the room's password: as the file says, else beyond loopback."""
+    if site.room.password is not None:
+        return site.room.password
+    try:
+        return not ipaddress.ip_address(site.room.bind).is_loopback
+    except ValueError:
+        return site.room.bind != "localhost"
+
+
+def services(site: Site, path: Path, *, join_token: str, users_file: Path | None) -> list[Service]:
+    """Return the services that the file names, in the order of their start."""
+    room = site.room
+    network = ["--room", room.id, "--endpoint", endpoint(site)]
+    words = {
+        "router": ["router", "--room", room.id, "--bind", room.bind, "--port", str(room.ports.router)],
+        "gateway": ["gateway", *network, "--bind", room.bind, "--port", str(room.ports.gateway)],
+        "fuse": ["fuse", *network],
+        "record": ["record", *network, "--out", room.recordings],
+        "view": ["view", *network, "--web", "--web-port", str(room.ports.web)],
+    }
+    words["gateway"] += [
+        "--site",
+        str(path),
+        "--join-token-sha256",
+        hashlib.sha256(join_token.encode()).hexdigest(),
+    ]
+    if users_file is not None:
+        words["router"] += ["--users", str(users_file)]
+    return [Service(name=name, words=words[name]) for name in room.services]
+
+
+def session(subject: Subject) -> Session:
+    """Return what the network is told of a subject."""
+    return Session(
+        side=subject.side,
+        height_m=subject.height_m,
+        lengths_m=subject.lengths_m,
+        facing_deg=subject.facing_deg,
+        exercise=subject.exercise,
+    )
