@@ -1,0 +1,83 @@
+"""The monitor on a real bus: it sees who was there before it, and what comes."""
+
+import io
+import json
+import socket
+import threading
+from collections.abc import Iterator
+
+import pytest
+
+from brachium_router import service as router
+from brachium_router.config import RouterSettings
+from brachium_viewer import monitor
+from brachium_viewer.monitor import MonitorSettings
+from brachium_wire import keys
+from brachium_wire.bus import Bus
+from brachium_wire.codec import encode
+from brachium_wire.messages import Info, Status
+
+ROOM = "gym"
+
+
+@pytest.fixture
+def bus() -> Iterator[Bus]:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port = probe.getsockname()[1]
+    stop = threading.Event()
+    thread = threading.Thread(target=router.run, args=(RouterSettings(room=ROOM, port=port), stop))
+    thread.start()
+    with Bus.open(f"tcp/127.0.0.1:{port}") as bus:
+        yield bus
+    stop.set()
+    thread.join(10)
+    assert not thread.is_alive()
+
+
+class Stopper(io.StringIO):
+    """Ends the monitor as soon as it wrote what is waited for."""
+
+    def __init__(self, stop: threading.Event, wanted: str) -> None:
+        super().__init__()
+        self._stop, self._wanted = stop, wanted
+
+    def write(self, text: str) -> int:
+        if self._wanted in text:
+            self._stop.set()
+        return super().write(text)
+
+
+@pytest.mark.network
+def test_it_shows_who_was_there_before_and_who_comes(bus: Bus) -> None:
+    bus.retain(
+        keys.info(ROOM, "p01", "hand_r"), encode(Info(node="n7", rate_hz=50.0, origin="emulated", host="h"))
+    )
+    stop = threading.Event()
+    out = Stopper(stop, '"battery_v": 3.5')
+    key = keys.status(ROOM, "p01", "hand_r")
+    status = encode(
+        Status(node="n7", time_ns=1, connected=True, received=9, lost=1, out_of_order=0, battery_v=3.5)
+    )
+    sender = threading.Thread(
+        target=lambda: [bus.put(key, status) for _ in iter(lambda: stop.wait(0.05), True)]
+    )
+    sender.start()
+    settings = MonitorSettings(endpoint=bus.endpoint, room=ROOM, json=True, seconds=20.0)
+    health = monitor.run(settings, stop, out)
+    stop.set()
+    sender.join()
+    (node,) = health.nodes
+    assert (node.node, node.state, node.received, node.battery_v) == ("n7", "missing", 9, 3.5)
+    lines = [json.loads(line) for line in out.getvalue().splitlines()]
+    assert lines[-1]["headline"] == "0 of 1 nodes live"
+    assert {(s["kind"], s["up"]) for s in lines[-1]["services"]} >= {("router", True), ("monitor", True)}
+
+
+@pytest.mark.network
+def test_a_pipe_gets_plain_blocks(bus: Bus) -> None:
+    stop = threading.Event()
+    out = Stopper(stop, "nodes live")
+    monitor.run(MonitorSettings(endpoint=bus.endpoint, room=ROOM, seconds=20.0), stop, out)
+    assert out.getvalue().startswith("0 of 0 nodes live\n")
+    assert "\x1b" not in out.getvalue()
