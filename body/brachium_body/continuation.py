@@ -129,7 +129,7 @@ def _follow_theta(raw: Array, last: Array, thorax_from_upper_arm: Array) -> Arra
     Each rotation has two triples: (a1, a2, a3) and (a1 + 180, 180 - a2, a3 + 180). The one that follows the
     last is taken; the first of an arm, the one that lies in the shoulder's range.
     """
-    first: Mask = np.isnan(last).any(axis=1)
+    first = np.isnan(last[:, 0])
     near_to = np.where(first[:, None], _BOX_MIDDLE, last)
     one, other = raw, _other_branch(raw)
     one_near, other_near = near_to + wrap(one - near_to), near_to + wrap(other - near_to)

@@ -34,8 +34,8 @@ def posed(side, **degrees):
 
 def test_columns_are_the_stated_ones_in_their_order():
     assert " ".join(angles.COLUMNS) == (
-        "theta1 theta2 theta3 theta4 theta5 theta6 theta7 shoulder_flexion shoulder_abduction shoulder_rotation "
-        "elbow_flexion forearm_pronation wrist_flexion wrist_deviation isb_plane isb_elevation isb_axial "
+        "theta1 theta2 theta3 theta4 theta5 theta6 theta7 shoulder_flexion shoulder_abduction "
+        "shoulder_rotation elbow_flexion forearm_pronation wrist_flexion wrist_deviation isb_plane isb_elevation isb_axial "
         "isb_elbow_flexion isb_carrying isb_pronation trunk_flexion trunk_lateral trunk_rotation "
         "clavicle_protraction clavicle_elevation"
     )

@@ -71,7 +71,7 @@ def test_the_first_sample_takes_the_branch_that_a_shoulder_can_have(side, start)
 
 
 def test_a_shoulder_lowered_another_way_than_raised_hangs_at_zero_again():
-    # Up in abduction, round to the front overhead, down in flexion: the triple of the way up would end at 180.
+    # Up in abduction, round to the front, down in flexion: the triple of the way up would end at 180.
 
     def way(a, b, n=150):
         return rotation.slerp(a, b, np.linspace(0.0, 1.0, n))
