@@ -27,7 +27,7 @@ def room_folder(room: str) -> Path:
 
 
 def load_or_make(folder: Path) -> RoomSecrets:
-    """Return the secrets kept in `folder`, made the first time. Raises ValueError for another form of file."""
+    """Return the secrets kept in `folder`, made the first time; ValueError for another form of file."""
     path = folder / "secrets.json"
     if not path.exists():
         made = RoomSecrets(password=_word(), join_token=_word())

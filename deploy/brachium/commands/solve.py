@@ -1,0 +1,90 @@
+"""Turn a recording or a capture folder into a table of angles, positions and orientations.
+
+brachium solve recording.mcap --out angles.csv
+"""
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from brachium.shell import Usage, add_json, print_json
+
+if TYPE_CHECKING:
+    from brachium_fusion.result import Group
+    from brachium_fusion.solve import SolveReport
+
+
+def configure(parser: argparse.ArgumentParser) -> None:
+    """Add the options."""
+    parser.add_argument("input", type=Path, metavar="INPUT", help="a recording (.mcap) or a capture folder")
+    parser.add_argument(
+        "--out", type=Path, metavar="FILE", help=".csv or .parquet; without it only the figures"
+    )
+    parser.add_argument("--subject", help="which subject of a recording; needed where there are several")
+    parser.add_argument(
+        "--filter", help="auto, vqf, complementary or complementary-printed (default: as live)"
+    )
+    parser.add_argument("--no-mag", action="store_true", help="leave magnetometers aside")
+    parser.add_argument("--rate", type=float, metavar="HZ", help="instants a second (default: as the input)")
+    parser.add_argument("--columns", metavar="GROUP,..", help="groups of columns, as in clinical,positions")
+    add_json(parser)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Solve, and tell what was found."""
+    from brachium_fusion import solve
+    from brachium_fusion.orientation import FILTERS
+    from brachium_fusion.result import GROUPS
+
+    if args.filter is not None and args.filter not in FILTERS:
+        raise Usage(f"--filter {args.filter!r} is not known; choose one of {', '.join(FILTERS)}")
+    report = solve.run(
+        solve.SolveSettings(
+            input=args.input,
+            out=args.out,
+            subject=args.subject,
+            filter=args.filter,
+            magnetometer=not args.no_mag,
+            rate_hz=args.rate,
+            groups=_groups(args.columns, GROUPS),
+        )
+    )
+    if args.json:
+        print_json(figures(report))
+    else:
+        print(_words(args.input, report))
+    return 0
+
+
+def figures(report: "SolveReport") -> dict[str, object]:
+    """Return the report without the skeletons themselves."""
+    return {name: getattr(report, name) for name in report.__slots__ if name != "skeletons"}
+
+
+def _groups(text: str | None, known: "tuple[Group, ...]") -> "tuple[Group, ...]":
+    if text is None:
+        return known
+    wanted = [word.strip() for word in text.split(",")]
+    for word in wanted:
+        if word not in known:
+            raise Usage(f"--columns {word!r} is not known; choose of {', '.join(known)}")
+    return tuple(group for group in known if group in wanted)
+
+
+def _words(source: Path, report: "SolveReport") -> str:
+    lines = [
+        f"{source}: {report.rows} instants, {' and '.join(report.sides)}, filter {report.filter}",
+        f"forward: {report.forward}",
+    ]
+    for segment, counts in report.quality.items():
+        lines.append(f"  {segment}: " + ", ".join(f"{n} {quality}" for quality, n in counts.items()))
+    if report.live_compared:
+        lines.append(
+            f"beside {report.live_compared} live skeletons: at most {report.live_angle_rad:.1e} rad "
+            f"and {report.live_position_m:.1e} m apart"
+        )
+    lines += [f"not used: {count} ({reason})" for reason, count in report.drops.items()]
+    lines += [f"warning: {warning}" for warning in report.warnings]
+    if report.out is not None:
+        lines.append(f"wrote {report.out}")
+    return "\n".join(lines)
