@@ -93,7 +93,8 @@ class Plot:
 
 def _plot(angle: str, title: str) -> Plot:
     low, high = REFERENCE[angle]
-    assert low is not None and high is not None, f"the reference range of {angle} has two ends"
+    assert low is not None, angle
+    assert high is not None, angle
     return Plot(angle=angle, title=title, low=low, high=high)
 
 

@@ -57,6 +57,8 @@ class Pen:
         self._recording = recording
         self._lanes: dict[str, str] = {}
         self._broken: set[str] = set()
+        recording.set_log_time_enabled(False)  # we say the time
+        recording.set_log_tick_enabled(False)
         recording.log("world", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
 
     def write(self, drawings: Mapping[str, tuple[float, Drawing]]) -> None:
@@ -128,7 +130,7 @@ class Screen:
 
     def _flush(self) -> None:
         try:
-            self._recording.flush(timeout_sec=1e9)
+            self._recording.flush()
         except (
             Exception
         ) as error:  # Rerun's own class is not public; the viewer's end is noticed by its process

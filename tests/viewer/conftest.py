@@ -1,0 +1,85 @@
+"""A moving arm as skeletons, and a router to send them through."""
+
+import socket
+import threading
+from collections.abc import Callable, Iterator
+
+import numpy as np
+import pytest
+
+from brachium_body import rotation
+from brachium_router.config import RouterSettings, endpoint
+from brachium_router.service import run as run_router
+from brachium_wire.messages import SegmentPose, Skeleton
+
+LENGTHS = (0.31, 0.26, 0.18)
+
+
+@pytest.fixture
+def arm_at() -> Callable[..., Skeleton]:
+    """A function of seconds that gives the skeleton of an arm that swings; its bones are LENGTHS long."""
+
+    def skeleton(
+        seconds: float,
+        *,
+        side: str = "right",
+        origin: str = "emulated",
+        quality: str = "good",
+        time_ns: int | None = None,
+        trunk_from_world: tuple[float, ...] = (1.0, 0.0, 0.0, 0.0),
+        off: float = 0.0,
+    ) -> Skeleton:
+        sign = 1.0 if side == "right" else -1.0
+        flexion = np.radians(45.0 + 35.0 * np.sin(0.9 * seconds) + off)
+        abduction = np.radians(22.0 + 14.0 * np.sin(0.5 * seconds))
+        elbow = np.radians(70.0 + 45.0 * np.sin(1.3 * seconds) + off)
+        wrist = np.radians(18.0 * np.sin(2.0 * seconds))
+        turns = [rotation.multiply(rotation.about(1, -sign * abduction), rotation.about(0, flexion))]
+        turns.append(rotation.multiply(turns[0], rotation.about(0, elbow)))
+        turns.append(rotation.multiply(turns[1], rotation.about(0, wrist)))
+        points = [np.array([sign * 0.19, 0.0, 0.0])]
+        for turn, length in zip(turns, LENGTHS, strict=True):
+            points.append(points[-1] + rotation.rotate(turn, (0.0, 0.0, -length)))
+        names = [f"{part}_{side[0]}" for part in ("upper_arm", "forearm", "hand")]
+        return Skeleton(
+            time_ns=time_ns if time_ns is not None else int(1e18 + 1e9 * seconds),
+            side=side,
+            origin=origin,
+            forward="facing",
+            trunk_from_world=trunk_from_world,
+            segments={
+                name: SegmentPose(quality=quality, sequence=7, world_from_segment=tuple(map(float, turn)))
+                for name, turn in zip(names, turns, strict=True)
+            },
+            positions={
+                name: tuple(map(float, point))
+                for name, point in zip(("shoulder", "elbow", "wrist", "hand"), points, strict=True)
+            },
+            angles={
+                "shoulder_flexion": float(flexion),
+                "shoulder_abduction": float(abduction),
+                "shoulder_rotation": float(np.radians(15.0 * np.sin(0.7 * seconds))),
+                "elbow_flexion": float(elbow),
+                "forearm_pronation": float(np.radians(40.0 * np.sin(seconds))),
+                "wrist_flexion": float(wrist),
+                "wrist_deviation": float(np.radians(8.0 * np.sin(1.7 * seconds))),
+            },
+        )
+
+    return skeleton
+
+
+@pytest.fixture
+def router_endpoint() -> Iterator[str]:
+    """The endpoint of a router that runs as long as the test."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port = int(probe.getsockname()[1])
+    settings = RouterSettings(port=port)
+    stop = threading.Event()
+    thread = threading.Thread(target=run_router, args=(settings, stop))
+    thread.start()
+    yield endpoint(settings)
+    stop.set()
+    thread.join(2.0)
+    assert not thread.is_alive()
