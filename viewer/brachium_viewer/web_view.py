@@ -95,13 +95,13 @@ def _handler(port: int, grpc_port: int, viewer_files_port: int) -> type[BaseHTTP
                 answer = source.getresponse()
                 length = answer.getheader("rerun-final-length") or answer.getheader("Content-Length")
                 if answer.status != 200 or length is None:
-                    self.send_error(502, "the viewer does not give its files")
-                    return
-                self._head(_VIEWERS[path], length)
-                shutil.copyfileobj(answer, self.wfile, 1 << 16)
+                    raise http.client.HTTPException(f"{answer.status} for {path}")
             except (OSError, http.client.HTTPException) as error:
                 log.debug("%s: %s", path, error)
-                self.close_connection = True
+                self.send_error(502, "the viewer does not give its files")
+            else:
+                self._head(_VIEWERS[path], length)
+                shutil.copyfileobj(answer, self.wfile, 1 << 16)
             finally:
                 source.close()
 
