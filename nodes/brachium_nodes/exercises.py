@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from brachium_nodes.desk import OnDesk, circle, rectangle
 from brachium_nodes.motions import Free, Keyframes, Motion, there_and_back
 
 
@@ -40,6 +41,7 @@ _SIP = {**_MOUTH, "shoulder_abduction": 38, "forearm_pronation": 22, "wrist_devi
 _DRINK = ((0.0, _LAP), (0.14, _CUP), (0.22, _CUP), (0.42, _MOUTH), (0.48, _SIP), (0.56, _SIP), (0.62, _MOUTH),
           (0.78, _CUP), (0.84, _CUP), (0.96, _LAP), (1.0, _LAP))  # fmt: skip
 _HANGING = {"shoulder_flexion": 0.0, "shoulder_abduction": 0.0, "shoulder_rotation": 0.0}
+_STRAIGHT_WRIST = {"wrist_flexion": 0.0, "wrist_deviation": 0.0}
 
 EXERCISES: dict[str, Exercise] = {
     e.name: e
@@ -51,8 +53,7 @@ EXERCISES: dict[str, Exercise] = {
             assumed_angles_deg={
                 **_HANGING,
                 "forearm_pronation": 0.0,
-                "wrist_flexion": 0.0,
-                "wrist_deviation": 0.0,
+                **_STRAIGHT_WRIST,
             },
         ),
         Exercise(
@@ -82,6 +83,18 @@ EXERCISES: dict[str, Exercise] = {
             assumed_angles_deg={**_HANGING, "elbow_flexion": 90.0, "forearm_pronation": 0.0},
         ),
         Exercise(
+            name="circle",
+            text="draw a circle of 10 cm radius on a desk",
+            motion=OnDesk(circle),
+            assumed_angles_deg=_STRAIGHT_WRIST,
+        ),
+        Exercise(
+            name="rectangle",
+            text="draw a rectangle of 20 by 14 cm on a desk",
+            motion=OnDesk(rectangle),
+            assumed_angles_deg=_STRAIGHT_WRIST,
+        ),
+        Exercise(
             name="reaching",
             text="reach forward from elbow 100 to 25 deg and come back, the shoulder in place",
             motion=there_and_back(
@@ -99,7 +112,8 @@ EXERCISES: dict[str, Exercise] = {
                     "shoulder_rotation": 0,
                     "forearm_pronation": 60,
                 },
-                hold=0.13,
+                move=0.3,
+                hold=0.125,
             ),
         ),
         Exercise(
@@ -114,9 +128,10 @@ EXERCISES: dict[str, Exercise] = {
                     "shoulder_abduction": 10,
                     "elbow_flexion": 17,
                 },
-                hold=0.2,
+                move=0.25,
+                hold=0.1,
             ),
-            assumed_angles_deg={"forearm_pronation": 0.0, "wrist_flexion": 0.0, "wrist_deviation": 0.0},
+            assumed_angles_deg={"forearm_pronation": 0.0, **_STRAIGHT_WRIST},
         ),
         Exercise(
             name="forearm-rotation",
@@ -153,9 +168,10 @@ EXERCISES: dict[str, Exercise] = {
                     "forearm_pronation": 30,
                 },
                 {"shift_forward": 0.06, "shift_out": -0.02, "shoulder_flexion": 40, "elbow_flexion": 60},
-                hold=0.12,
+                move=0.25,
+                hold=0.1,
             ),
-            assumed_angles_deg={"forearm_pronation": 30.0, "wrist_flexion": 0.0, "wrist_deviation": 0.0},
+            assumed_angles_deg={"forearm_pronation": 30.0, **_STRAIGHT_WRIST},
         ),
         Exercise(
             name="external-rotation",

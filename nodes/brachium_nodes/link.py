@@ -55,7 +55,7 @@ WIFI: dict[Wifi, Delay] = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FaultSettings:
-    """What goes wrong on the way; probabilities a packet, all off by default."""
+    """What goes wrong on the way; probabilities a packet, each excluding the others, all off by default."""
 
     loss: float = 0.0
     """A packet is lost."""
@@ -72,13 +72,12 @@ class FaultSettings:
         """Raise ValueError for what is no probability."""
         for name in ("loss", "burst_loss", "swap", "duplicate"):
             if not 0.0 <= getattr(self, name) <= 1.0:
-                raise ValueError(f"{name} {getattr(self, name)} is no probability; give 0 to 1")
-        if self.loss + self.burst_loss + self.swap + self.duplicate > 1.0:
-            raise ValueError(
-                "loss, burst_loss, swap and duplicate exclude one another; give at most 1 in sum"
-            )
-        if self.burst_packets < 1:
-            raise ValueError(f"bursts of {self.burst_packets} packets cannot be lost; give 1 or more")
+                raise ValueError(f"{name} {getattr(self, name)} is no probability; give 0 to 0.95")
+        total = self.loss + self.burst_loss + self.swap + self.duplicate
+        if total > 0.95:
+            raise ValueError(f"faults of {total:g} in sum leave too little; give at most 0.95")
+        if not 1 <= self.burst_packets <= 1000:
+            raise ValueError(f"bursts of {self.burst_packets} packets cannot be lost; give 1 to 1000")
         if self.wifi not in WIFI:
             raise ValueError(f"wifi {self.wifi!r} is not known; choose one of {', '.join(WIFI)}")
 
@@ -119,7 +118,13 @@ class EmulatedClock:
 
     def sample_time_s(self, index: Integers) -> Array:
         """Return the true times at which samples (n,) are taken."""
-        return self.phase_s + index / (self.rate_hz * (1.0 + self.skew))
+        times: Array = self.phase_s + index.astype(np.float64) * self.period_s
+        return times
+
+    @property
+    def period_s(self) -> float:
+        """True time between samples."""
+        return 1.0 / (self.rate_hz * (1.0 + self.skew))
 
     def ticks_us(self, time_s: Array) -> Integers:
         """Return what the clock shows at true times (n,), us."""
@@ -142,7 +147,8 @@ def departures(
 ) -> Iterator[Departure]:
     """Yield for ever what arrives of packets of `samples` samples that are ready once every `period_s`.
 
-    Packet 0 is never lost or swapped: a receiver could not know of it. A burst holds back what follows it.
+    Packet 0 is never lost or swapped: a receiver could not know of it. A burst of Wi-Fi delay holds back what
+    follows it. The two packets of a swap arrive at one time; with the second the counts are complete again.
     """
     latest, losing = -inf, 0
     held: int | None = None

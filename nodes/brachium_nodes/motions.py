@@ -97,13 +97,18 @@ class Keyframes:
 
 
 def there_and_back(
-    base: Mapping[str, float], peak: Mapping[str, float], period_s: float = 4.0, hold: float = 0.08
+    base: Mapping[str, float],
+    peak: Mapping[str, float],
+    period_s: float = 4.0,
+    move: float = 0.42,
+    hold: float = 0.08,
 ) -> Keyframes:
-    """Return repetitions from base to peak, a short hold, back, and a short rest."""
-    move = 0.5 - hold
+    """Return repetitions from base to peak, a hold, back, and a rest; `move` and `hold` are fractions."""
     both = dict.fromkeys((*base, *peak), 0.0)
     low, high = {**both, **base}, {**both, **base, **peak}
-    return Keyframes(period_s, ((0.0, low), (move, high), (move + hold, high), (1.0 - hold, low), (1.0, low)))
+    return Keyframes(
+        period_s, ((0.0, low), (move, high), (move + hold, high), (2.0 * move + hold, low), (1.0, low))
+    )
 
 
 @dataclass(frozen=True, slots=True)

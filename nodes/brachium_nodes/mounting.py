@@ -8,21 +8,14 @@ import numpy as np
 from brachium_body import rotation
 from brachium_body.lengths import ArmLengths
 from brachium_body.segments import Segment
+from brachium_nodes import tissue
 from brachium_nodes.movement import Array, minimum_jerk
 from brachium_nodes.person import NEUTRAL_S, TRANSITION_S, Person
-from brachium_nodes.sensors import FIELD_UT, Errors, G, generator
+from brachium_nodes.sensors import FIELD_UT, GRAVITY, Errors, generator
 from brachium_wire.messages import Quaternion, Vector
 
 STEP_S = 0.001
 """Of the central differences that give acceleration and angular rate."""
-
-_NEIGHBOURS = {
-    "upper_arm": ("shoulder_flexion", "shoulder_abduction", "shoulder_rotation", "elbow_flexion"),
-    "forearm": ("elbow_flexion", "forearm_pronation", "wrist_flexion"),
-    "hand": ("wrist_flexion", "wrist_deviation"),
-    "sternum": (),
-}
-"""Joints whose movement pulls the skin under a sensor."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,7 +74,7 @@ class Worn:
         where = place(segment, person.lengths)
         random = generator(person.settings.seed, segment, "strap")
         off = rotation.from_rotation_vector(random_turn(errors.placement_deg, random))
-        directions = random.standard_normal((len(_NEIGHBOURS[where.part]), 3))
+        directions = random.standard_normal((len(tissue.NEIGHBOURS[where.part]), 3))
         unit = directions / np.linalg.norm(directions, axis=1, keepdims=True)
         return cls(
             segment,
@@ -91,40 +84,70 @@ class Worn:
             tissue=unit * (errors.soft_tissue_deg * pi / 180.0),
         )
 
-    def pose(self, t: Array, person: Person) -> tuple[Array, Array]:
-        """Return world_from_sensor (n, 4) and the sensor's place in the world (n, 3) m at times (n,)."""
-        if self.segment == "sternum":
-            trunk = person.trunk(t)
-            bone, joint, angles = trunk.world_from_thorax, trunk.chest, trunk.angles
-        else:
-            arm = person.arm(t, "right" if self.segment.endswith("_r") else "left")
-            bone, joint, angles = arm.world_from[self.place.part], arm.joints[self.place.joint], arm.angles
-        skin = bone
+    def truth(self, t: Array, period_s: float, person: Person) -> tuple[Array, Array, Array]:
+        """Return specific force m/s^2, angular rate rad/s and field uT (n, 3) in sensor axes.
+
+        The times t (n,) are `period_s` apart.
+        """
+        n = len(t)
+        around = np.concatenate([t - STEP_S, t, t + STEP_S])
+        q, p = self.pose(around, person, self._wobble(t, period_s, person))
+        sensor_from_world = rotation.inverse(q[n : 2 * n])
+        turn = rotation.to_rotation_vector(rotation.multiply(rotation.inverse(q[:n]), q[2 * n :]))
+        return (
+            rotation.rotate(sensor_from_world, _second_difference(p) - GRAVITY),
+            turn / (2.0 * STEP_S),
+            rotation.rotate(sensor_from_world, FIELD_UT),
+        )
+
+    def pose(self, t: Array, person: Person, shift: Array | None = None) -> tuple[Array, Array]:
+        """Return world_from_sensor (n, 4) and the sensor's place in the world (n, 3) m at times (n,).
+
+        `shift` (n, 3) m, in segment axes, is the skin's wobble; none if left out.
+        """
+        bone, joint, angles = self._bone(t, person)
+        skin, place = bone, np.array(self.place.lever)
         if self.tissue.any():
-            # sqrt(2) sin(angle / 2) is 0 in neutral, 1 at 90 deg, and still grows beyond.
-            pull = np.stack(
-                [sqrt(2.0) * np.sin(0.5 * angles[n]) for n in _NEIGHBOURS[self.place.part]], axis=-1
-            )
-            skin = rotation.multiply(bone, rotation.from_rotation_vector(pull @ self.tissue))
+            pulled = np.einsum("nj,ji->ni", tissue.pull(angles, self.place.part), self.tissue)
+            skin = rotation.multiply(skin, rotation.from_rotation_vector(pulled))
+        point = joint + rotation.rotate(skin, place)
+        if shift is not None:
+            skin = rotation.multiply(skin, rotation.from_rotation_vector(tissue.tip(shift)))
+            point = point + rotation.rotate(bone, shift)
         q = rotation.multiply(skin, self.placement)
         if self.settling.any():
             begun = minimum_jerk((t - NEUTRAL_S) / TRANSITION_S)
             q = rotation.multiply(q, rotation.from_rotation_vector(begun[:, None] * self.settling))
-        return q, joint + rotation.rotate(skin, np.array(self.place.lever))
+        return q, point
 
-    def truth(self, t: Array, person: Person) -> tuple[Array, Array, Array]:
-        """Return specific force m/s^2, angular rate rad/s and field uT (n, 3), sensor axes, at times (n,)."""
-        n = len(t)
-        q, p = self.pose(np.concatenate([t - STEP_S, t, t + STEP_S]), person)
-        acceleration = (p[2 * n :] - 2.0 * p[n : 2 * n] + p[:n]) / (STEP_S * STEP_S)
-        acceleration[:, 2] += G
-        sensor_from_world = rotation.inverse(q[n : 2 * n])
-        turn = rotation.to_rotation_vector(rotation.multiply(rotation.inverse(q[:n]), q[2 * n :]))
-        return (
-            rotation.rotate(sensor_from_world, acceleration),
-            turn / (2.0 * STEP_S),
-            rotation.rotate(sensor_from_world, FIELD_UT),
-        )
+    def _bone(self, t: Array, person: Person) -> tuple[Array, Array, dict[str, Array]]:
+        """Return world_from_segment, the joint that the sensor is measured from, and the joint angles."""
+        if self.segment == "sternum":
+            trunk = person.trunk(t)
+            return trunk.world_from_thorax, trunk.chest, person.posture(t, person.moving_side).angles
+        arm = person.arm(t, "right" if self.segment.endswith("_r") else "left")
+        return arm.world_from[self.place.part], arm.joints[self.place.joint], arm.angles
+
+    def _wobble(self, t: Array, period_s: float, person: Person) -> Array | None:
+        """Return the skin's shift (3 n, 3) m STEP_S before, at and after each time; rigid: None."""
+        if not self.tissue.any():
+            return None
+        early = tissue.warm_up(period_s)
+        before = t[0] - period_s * np.arange(early, 0, -1)
+        times = np.concatenate([before, t])
+        m = len(times)
+        bone, joint, _ = self._bone(np.concatenate([times - STEP_S, times, times + STEP_S]), person)
+        acceleration = _second_difference(joint + rotation.rotate(bone, np.array(self.place.lever)))
+        along = rotation.rotate(rotation.inverse(bone[m : 2 * m]), acceleration)
+        x, v, a = (part[early:] for part in tissue.wobble(along, period_s))
+        bend = 0.5 * STEP_S**2 * a
+        return np.concatenate([x - STEP_S * v + bend, x, x + STEP_S * v + bend])
+
+
+def _second_difference(p: Array) -> Array:
+    before, at, after = np.split(p, 3)
+    acceleration: Array = (after - 2.0 * at + before) / (STEP_S * STEP_S)
+    return acceleration
 
 
 def random_turn(degrees_rms: float, random: np.random.Generator) -> Array:

@@ -16,7 +16,7 @@ from brachium_body.lengths import ArmLengths, from_height
 from brachium_body.segments import ARM_PARTS, Side
 from brachium_nodes.exercises import EXERCISES
 from brachium_nodes.motions import DEG, Build, Posture
-from brachium_nodes.movement import Array, Variation, minimum_jerk
+from brachium_nodes.movement import Array, Variation, eased, minimum_jerk
 
 Arms = Literal["right", "left", "both"]
 
@@ -47,8 +47,8 @@ class PersonSettings:
             raise ValueError(f"exercise {self.exercise!r} is not known; choose one of {', '.join(EXERCISES)}")
         if self.arms not in ("right", "left", "both"):
             raise ValueError(f"arms {self.arms!r} is not known; choose right, left or both")
-        if not 1.0 <= self.height_m <= 2.3:
-            raise ValueError(f"height {self.height_m} m cannot be used; give 1.0 to 2.3 m")
+        if not 1.4 <= self.height_m <= 2.3:
+            raise ValueError(f"height {self.height_m} m cannot be used; give 1.4 to 2.3 m")
         if not 0.0 <= self.carrying_deg <= 30.0:
             raise ValueError(
                 f"carrying angle {self.carrying_deg} deg cannot be used; give 0 to 30 deg valgus"
@@ -94,12 +94,18 @@ class Person:
         """Lengths between joint centres, those that body height suggests."""
         return from_height(self.settings.height_m)
 
+    @property
+    def moving_side(self) -> Side:
+        """The arm that exercises; the right one if both do."""
+        return "left" if self.settings.arms == "left" else "right"
+
     def posture(self, t: Array, side: Side) -> Posture:
         """Return joint angles and shoulder translation at times (n,)."""
         s = self.settings
         build = Build(lengths=self.lengths, carrying=-s.carrying_deg * DEG)
         motion = EXERCISES[s.exercise].motion
-        moving = motion(np.maximum(t - NEUTRAL_S - TRANSITION_S, 0.0), Variation(s.seed, side), build)
+        exercising = eased(t - NEUTRAL_S - TRANSITION_S, rise_s=1.0)
+        moving = motion(exercising, Variation(s.seed, side), build)
         return moving.scaled(self._begun(t) if s.arms in (side, "both") else np.zeros(len(t)))
 
     def trunk(self, t: Array) -> Trunk:

@@ -20,6 +20,7 @@ Level = Literal["exact", "ideal", "typical"]
 
 G = 9.81
 """Standard acceleration in this project, m/s^2."""
+GRAVITY: Array = np.array([0.0, 0.0, -G])
 FIELD_UT: Array = 46.0 * np.array([0.0, cos(radians(60.0)), -sin(radians(60.0))])
 """Earth's field east, north, up: 46 uT, dip 60 deg (central Europe is 48 uT, 60 to 67 deg)."""
 CHIP = "MPU-9150 (emulated)"

@@ -168,9 +168,9 @@ class Wearer:
     def packets(self, segment: Segment, faults: FaultSettings | None = None) -> Iterator[Packet]:
         """Yield for ever the packets of one segment's sensor in the order in which they arrive."""
         clock, n = self.clocks[segment], self.settings.batch
-        ready = clock.sample_time_s(np.array([n - 1, 2 * n - 1])).tolist()
+        (ready,) = clock.sample_time_s(np.array([n - 1])).tolist()
         for departure in departures(
-            ready[0], ready[1] - ready[0], n, faults or FaultSettings(), self.settings.seed, segment
+            ready, n * clock.period_s, n, faults or FaultSettings(), self.settings.seed, segment
         ):
             readings = self.samples(segment, departure.number * n, n)
             yield Packet(
@@ -238,8 +238,9 @@ class Wearer:
     def _make_block(self, segment: Segment, block: int) -> tuple[Array, Array, Array, Array]:
         """Return time, acc, gyr, mag of one block. It is always made whole, so no cut changes a bit."""
         index = np.arange(block * self._size, (block + 1) * self._size)
-        t = self.clocks[segment].sample_time_s(index)
-        acc, gyr, mag = self._worn[segment].truth(t, self.person)
+        clock = self.clocks[segment]
+        t = clock.sample_time_s(index)
+        acc, gyr, mag = self._worn[segment].truth(t, clock.period_s, self.person)
         random = generator(self.settings.seed, segment, "noise", block)
         drift = self._drift(segment, block)
         return t, *self._chips[segment].read(acc, gyr, mag, self.settings.rate_hz, drift, random)

@@ -48,8 +48,9 @@ def test_the_same_seed_gives_the_same_bytes_and_another_seed_others() -> None:
         return Wearer(WearerSettings(seed=seed)).samples(segment, 0, 700)  # type: ignore[arg-type]
 
     assert same(run(1), run(1))
-    assert not np.isclose(run(1).acc, run(2).acc).any()
-    assert not np.isclose(run(1).gyr, run(1, "forearm_r").gyr).any()
+    for other in (run(2), run(1, "forearm_r")):  # steps of the chip are wide enough to meet now and then
+        assert (run(1).acc == other.acc).mean() < 0.02
+        assert (run(1).gyr == other.gyr).mean() < 0.1
 
 
 def test_samples_far_into_the_exercise_need_no_past() -> None:
