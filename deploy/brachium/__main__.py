@@ -29,9 +29,7 @@ def main(argv: list[str] | None = None) -> int:
         print(_help())
         return 0
     if words[0] == "--version":
-        from importlib.metadata import version
-
-        print(f"brachium {version('brachium')}")
+        print(_version())
         return 0
     if words[0] not in COMMANDS:
         print(_unknown(words[0]), file=sys.stderr)
@@ -54,6 +52,15 @@ def _help() -> str:
         "this version:  brachium --version\n\n"
         "A measuring and research tool, not a medical device."
     )
+
+
+def _version() -> str:
+    from importlib import metadata
+
+    try:
+        return f"brachium {metadata.version('brachium')}"
+    except metadata.PackageNotFoundError:
+        return "brachium, from its source tree"
 
 
 def _unknown(word: str) -> str:

@@ -11,6 +11,8 @@ from collections.abc import Callable
 from types import FrameType
 from typing import Any, Protocol
 
+from brachium_wire import keys
+
 DEFAULT_ROOM = "lab"
 
 EXTRAS = {
@@ -63,6 +65,8 @@ def run_command(name: str, summary: str, module: Any, words: list[str]) -> int:
     args = parser.parse_args(words)  # exits with 2 by itself
     _start_log(args.verbose)
     try:
+        if "room" in args:
+            keys.chunk(args.room, "room")
         return command.run(args) or 0
     except KeyboardInterrupt:
         return 1

@@ -1,0 +1,53 @@
+import os
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from brachium.checks import free_port
+from brachium.processes import Processes
+
+ROOT = Path(__file__).parents[2]
+PARTS = ("body", "wire", "nodes", "router", "fusion", "viewer", "deploy")
+
+
+@pytest.fixture(autouse=True)
+def _children_see_the_source(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Child processes import what this one imports: the tree, or the wheel when the tree is not there."""
+    folders = [str(ROOT / part) for part in PARTS if (ROOT / part).is_dir()]
+    if folders:
+        monkeypatch.setenv("PYTHONPATH", os.pathsep.join(folders))
+    else:
+        monkeypatch.delenv("PYTHONPATH", raising=False)
+
+
+def brachium(*words: str, timeout_s: float = 60.0) -> subprocess.CompletedProcess[str]:
+    """Run one command to its end."""
+    return subprocess.run(
+        [sys.executable, "-W", "error", "-m", "brachium", *words],
+        capture_output=True,
+        text=True,
+        timeout=timeout_s,
+        check=False,
+    )
+
+
+@pytest.fixture(name="brachium")
+def _brachium():
+    return brachium
+
+
+@pytest.fixture
+def processes() -> Iterator[Processes]:
+    with Processes() as children:
+        yield children
+
+
+@pytest.fixture
+def router_endpoint(processes: Processes) -> str:
+    """A router of its own on loopback, in room `lab`."""
+    port = free_port()
+    processes.start("router", ["router", "--port", str(port)])
+    return f"tcp/127.0.0.1:{port}"

@@ -1,0 +1,109 @@
+import os
+import subprocess
+import sys
+
+import pytest
+
+from brachium.__main__ import COMMANDS, main
+
+HEAVY = (
+    "numpy",
+    "zenoh",
+    "scipy",
+    "rerun",
+    "msgspec",
+    "msgpack",
+    "websockets",
+    "matplotlib",
+    "pyarrow",
+    "asyncio",
+)
+
+
+def test_help_loads_nothing_heavy():
+    """The promise is an answer within 0.3 s; what keeps it is that only the table is read."""
+    code = (
+        "import sys\nfrom brachium.__main__ import main\nassert main(['--help']) == 0\n"
+        f"sys.exit(sorted(set({HEAVY}) & set(sys.modules)) or 0)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert all(f"  {name} " in done.stdout for name in COMMANDS)
+
+
+def test_importing_brachium_loads_nothing_heavy():
+    code = f"import sys, brachium\nsys.exit(sorted(set({HEAVY}) & set(sys.modules)) or 0)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_each_command_explains_itself_with_an_example(name: str, capsys: pytest.CaptureFixture[str]):
+    with pytest.raises(SystemExit) as ended:
+        main([name, "--help"])
+    assert ended.value.code == 0
+    said = capsys.readouterr().out
+    assert f"usage: brachium {name}" in said
+    example = said.split("example:\n")[1]
+    assert f"brachium {name} " in example or f"brachium {name}\n" in example
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_an_unknown_option_is_usage(name: str, capsys: pytest.CaptureFixture[str]):
+    with pytest.raises(SystemExit) as ended:
+        main([name, "--no-such-option"])
+    assert ended.value.code == 2
+    assert capsys.readouterr().err
+
+
+def test_an_unknown_command_names_the_nearest(capsys: pytest.CaptureFixture[str]):
+    assert main(["rooter"]) == 2
+    assert capsys.readouterr().err == "brachium: no command 'rooter'; did you mean 'router'?\n"
+    assert main(["xyzzy"]) == 2
+    assert "brachium --help" in capsys.readouterr().err
+
+
+def test_the_version_is_the_distributions(brachium):
+    done = brachium("--version")
+    assert done.returncode == 0
+    assert done.stdout.startswith(("brachium 0.", "brachium, from"))
+
+
+BAD_INPUT = {
+    "all interfaces": (["router", "--bind", "0.0.0.0"], "every interface"),
+    "port outside": (["router", "--port", "99999"], "65535"),
+    "no such input": (["solve", "nothing.mcap"], "nothing.mcap"),
+    "foreign file": (["solve", __file__], "not a recording"),
+    "unknown filter": (["solve", "nothing.mcap", "--filter", "magic"], "choose one of"),
+    "no such site": (["up", "nothing.toml"], "nothing.toml"),
+    "foreign site": (["up", __file__], "not TOML"),
+    "assign without a place": (["gateway", "--assign", "esp-1"], "ID=SUBJECT/SEGMENT"),
+    "assign with a wildcard": (["gateway", "--assign", "esp-1=p01/*"], "segment '*'"),
+    "room of two words": (["fuse", "--room", "my room"], "room 'my room'"),
+    "unknown exercise": (["emulate", "--exercise", "flying"], "choose one of"),
+    "nothing to play": (["play", "nothing"], "nothing"),
+    "nothing to compare": (["compare", "a.csv", "b.csv"], "a.csv"),
+}
+
+
+@pytest.mark.parametrize("case", BAD_INPUT)
+def test_bad_input_is_one_line_and_code_2(case: str, brachium):
+    words, expected = BAD_INPUT[case]
+    done = brachium(*words)
+    said = [line for line in done.stderr.splitlines() if line.startswith(f"brachium {words[0]}: ")]
+    assert done.returncode == 2, done.stderr
+    assert len(said) == 1
+    assert expected in said[0]
+    assert "Traceback" not in done.stderr
+
+
+def test_a_missing_extra_is_one_line_that_names_it(brachium, tmp_path, monkeypatch):
+    (tmp_path / "sitecustomize.py").write_text("import sys\nsys.modules['pyarrow'] = None\n")
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(tmp_path), os.environ.get("PYTHONPATH", "")]))
+    capture = tmp_path / "capture"
+    capture.mkdir()
+    (capture / "forearm_r.parquet").write_bytes(b"PAR1")
+    done = brachium("solve", str(capture))
+    assert done.returncode == 1
+    assert "pip install 'brachium[parquet]'" in done.stderr
+    assert "Traceback" not in done.stderr
