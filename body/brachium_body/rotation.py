@@ -21,16 +21,27 @@ def normalize(q: npt.ArrayLike) -> Array:
 
 def multiply(p: npt.ArrayLike, q: npt.ArrayLike) -> Array:
     """Return the Hamilton product p q of (..., 4) arrays: first q, then p."""
-    p, q = np.asarray(p, dtype=np.float64), np.asarray(q, dtype=np.float64)
-    pw, px, py, pz = p[..., 0], p[..., 1], p[..., 2], p[..., 3]
-    qw, qx, qy, qz = q[..., 0], q[..., 1], q[..., 2], q[..., 3]
-    w = pw * qw - px * qx - py * qy - pz * qz
-    product = np.empty((*w.shape, 4))
-    product[..., 0] = w
-    product[..., 1] = pw * qx + px * qw + py * qz - pz * qy
-    product[..., 2] = pw * qy - px * qz + py * qw + pz * qx
-    product[..., 3] = pw * qz + px * qy - py * qx + pz * qw
-    return product
+    pw, px, py, pz = _components(p)
+    qw, qx, qy, qz = _components(q)
+    return _joined(
+        pw * qw - px * qx - py * qy - pz * qz,
+        pw * qx + px * qw + py * qz - pz * qy,
+        pw * qy - px * qz + py * qw + pz * qx,
+        pw * qz + px * qy - py * qx + pz * qw,
+    )
+
+
+def _components(array: npt.ArrayLike) -> tuple[Array, ...]:
+    a = np.asarray(array, dtype=np.float64)
+    return tuple(a[..., i] for i in range(a.shape[-1]))
+
+
+def _joined(*components: Array) -> Array:
+    """Stack equal shapes along a new last axis: what np.stack does, at a fifth of its cost for few rows."""
+    result = np.empty((*components[0].shape, len(components)))
+    for i, component in enumerate(components):
+        result[..., i] = component
+    return result
 
 
 _CONJUGATE: Array = np.array([1.0, -1.0, -1.0, -1.0])
@@ -43,12 +54,14 @@ def inverse(q: npt.ArrayLike) -> Array:
 
 def rotate(q: npt.ArrayLike, v: npt.ArrayLike) -> Array:
     """Return the vectors v (..., 3), given in b's axes, in a's axes, q being `a_from_b`."""
-    q = np.asarray(q, dtype=np.float64)
-    v = np.asarray(v, dtype=np.float64)
-    axis = q[..., 1:]
-    t = 2.0 * np.cross(axis, v)
-    result: Array = v + q[..., :1] * t + np.cross(axis, t)
-    return result
+    w, x, y, z = _components(q)
+    vx, vy, vz = _components(v)
+    tx, ty, tz = 2.0 * (y * vz - z * vy), 2.0 * (z * vx - x * vz), 2.0 * (x * vy - y * vx)
+    return _joined(
+        vx + w * tx + y * tz - z * ty,
+        vy + w * ty + z * tx - x * tz,
+        vz + w * tz + x * ty - y * tx,
+    )
 
 
 def from_rotation_vector(v: npt.ArrayLike) -> Array:
@@ -85,15 +98,19 @@ def about(axis: int, angle: npt.ArrayLike) -> Array:
 
 def to_matrix(q: npt.ArrayLike) -> Array:
     """Return rotation matrices (..., 3, 3) whose columns are b's axes in a."""
-    w, x, y, z = np.moveaxis(np.asarray(q, dtype=np.float64), -1, 0)
-    return np.stack(
-        [
-            np.stack([1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)], axis=-1),
-            np.stack([2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)], axis=-1),
-            np.stack([2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)], axis=-1),
-        ],
-        axis=-2,
+    w, x, y, z = _components(q)
+    entries = _joined(
+        1 - 2 * (y * y + z * z),
+        2 * (x * y - w * z),
+        2 * (x * z + w * y),
+        2 * (x * y + w * z),
+        1 - 2 * (x * x + z * z),
+        2 * (y * z - w * x),
+        2 * (x * z - w * y),
+        2 * (y * z + w * x),
+        1 - 2 * (x * x + y * y),
     )
+    return entries.reshape(*w.shape, 3, 3)
 
 
 def from_matrix(matrix: npt.ArrayLike) -> Array:

@@ -1,0 +1,402 @@
+"""Kinematics of many arms at once: orientations of sensors at solved instants in, skeletons out. Pure.
+
+A row is one arm at one instant. Everything but the memory of each arm's last angles is computed for all rows in one
+go; the memory takes each arm's rows one after another.
+"""
+
+from collections.abc import Sequence
+from math import radians
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from brachium_body import rotation
+from brachium_body.angles import CLAVICLE, COLUMNS, ELBOW, INDEX, SHOULDER, TRUNK, WRIST, joint_angles
+from brachium_body.assumptions import (
+    AS_STATED_BY_DEFAULT,
+    ASSUMED,
+    StatedAngles,
+    complete,
+    known_set,
+    provenance,
+    withhold,
+)
+from brachium_body.continuation import AngleTracker
+from brachium_body.kinematics import JOINTS, TRUNK_FROM_THORAX, SegmentOrientations, between, positions
+from brachium_body.lengths import ArmLengths, from_measured
+from brachium_body.segments import SIDES, Side, arm_segments
+from brachium_fusion.pose import Alignment
+from brachium_fusion.subject import Instant, Settings, Subject, segment_quality
+from brachium_fusion.track import Reading
+from brachium_wire.messages import Forward, Origin, Quality, SegmentPose, Session, Skeleton
+
+Floats = npt.NDArray[np.float64]
+
+DEFAULT_HEIGHT_M = 1.75
+"""Used for lengths while nobody said how tall the subject is."""
+HEADING_SD_DEG = 2.0
+HEADING_DRIFT_DEG_S = 0.02
+"""Heading without a magnetometer: uncertain by 2 deg after a pose, then by what a bias estimated at rests leaves of a
+cheap gyroscope (0.02 deg/s). A working assumption, stated in docs/conventions.md."""
+WITHHOLD_DEG = 15.0
+"""Angles that rest on heading are left out when it is less certain than this."""
+
+_SLOTS = 4  # sternum, upper arm, forearm, hand
+_NOTHING: Floats = np.full(4, np.nan)
+_ON_HEADING = np.array([INDEX[n] for n in SHOULDER if n != "isb_elevation"])
+_RANK: dict[Quality, int] = {
+    "good": 0,
+    "disturbed": 1,
+    "heading_assumed": 2,
+    "uncalibrated": 3,
+    "held": 4,
+    "missing": 5,
+    "assumed": 6,
+}
+"""The worse quality wins where several segments meet; `held` tells more about now than how it was aligned."""
+
+
+class Row(NamedTuple):
+    """One arm at one instant, and all that it is computed from."""
+
+    subject: str
+    side: Side
+    time_ns: int
+    received_ns: int
+    readings: tuple[Reading | None, ...]
+    qualities: tuple[Quality | None, ...]
+    """Per slot; None where the subject wears no sensor there."""
+    turn: Floats
+    """(4, 4) heading correction of each slot's sensor."""
+    sensor_from_segment: Floats
+    """(4, 4)."""
+    trunk_from_world: Floats
+    """(4,) while no sternum sensor says otherwise."""
+    lengths: ArmLengths
+    stated: StatedAngles
+    forward: Forward
+    origin: Origin
+    withhold_heading: bool
+    sternum_aligned: bool
+
+
+def rows_of(subject_id: str, subject: Subject, instant: Instant) -> list[Row]:
+    """Return a row for each side of which an arm segment is known at the instant."""
+    rows = []
+    for side in SIDES:
+        arm = arm_segments(side)
+        if not any(instant.readings.get(segment) for segment in arm):
+            continue
+        slots = ("sternum", *arm)
+        frame = _frame(subject, instant, side)
+        rows.append(
+            Row(
+                subject=subject_id,
+                side=side,
+                time_ns=instant.time_ns,
+                received_ns=instant.received_ns,
+                readings=tuple(instant.readings.get(s) for s in slots),
+                qualities=tuple(
+                    segment_quality(instant.readings[s], instant.alignment, s)
+                    if s in instant.readings
+                    else None
+                    for s in slots
+                ),
+                turn=frame.turn,
+                sensor_from_segment=frame.sensor_from_segment,
+                trunk_from_world=frame.trunk_from_world,
+                lengths=frame.lengths,
+                stated=frame.stated,
+                forward="none" if instant.alignment is None else instant.alignment.forward,
+                origin=frame.origin,
+                withhold_heading=frame.drifts
+                and HEADING_SD_DEG + HEADING_DRIFT_DEG_S * 1e-9 * (instant.time_ns - subject.reference_ns)
+                > WITHHOLD_DEG,
+                sternum_aligned=instant.alignment is not None and "sternum" in instant.alignment.mounting,
+            )
+        )
+    return rows
+
+
+class _Frame(NamedTuple):
+    """What stays the same for an arm between two calibrations."""
+
+    key: tuple[Any, ...]
+    turn: Floats
+    sensor_from_segment: Floats
+    trunk_from_world: Floats
+    lengths: ArmLengths
+    stated: StatedAngles
+    origin: Origin
+    drifts: bool
+
+
+def _frame(subject: Subject, instant: Instant, side: Side) -> _Frame:
+    """Return the arm's frame, made anew only when something it rests on was replaced."""
+    key = (instant.alignment, instant.session, len(subject.tracks))
+    known = subject.frames.get(side)
+    if known is not None and all(a is b or a == b for a, b in zip(known.key[1:], key[1:], strict=True)):
+        if known.key[0] is key[0]:
+            return known
+    slots = ("sternum", *arm_segments(side))
+    alignment = instant.alignment or Alignment(world_from_trunk=_facing(instant.session, subject))
+    turn = np.tile(rotation.IDENTITY, (_SLOTS, 1))
+    sensor_from_segment = turn.copy()
+    for index, segment in enumerate(slots):
+        track = subject.tracks.get(segment)
+        if segment in alignment.mounting:
+            sensor_from_segment[index] = rotation.inverse(alignment.mounting[segment])
+            turn[index] = rotation.about(2, alignment.heading[segment])
+        elif track is not None and track.info.mounting is not None:
+            sensor_from_segment[index] = rotation.inverse(track.info.mounting)
+    tracks = [subject.tracks[s] for s in slots if s in subject.tracks]
+    origins = {track.info.origin for track in tracks}
+    frame = _Frame(
+        key=key,
+        turn=turn,
+        sensor_from_segment=sensor_from_segment,
+        trunk_from_world=rotation.inverse(alignment.world_from_trunk),
+        lengths=lengths_of(instant.session),
+        stated=_stated(instant.session),
+        origin="emulated" if "emulated" in origins else "playback" if "playback" in origins else "worn",
+        drifts=not any(t.magnetometer or t.info.orientation_only for t in tracks)
+        and "sternum" not in subject.tracks,
+    )
+    subject.frames[side] = frame
+    return frame
+
+
+def lengths_of(session: Session) -> ArmLengths:
+    """Return the arm lengths a session states, completed from height."""
+    return from_measured(session.lengths_m, session.height_m or DEFAULT_HEIGHT_M)
+
+
+def _facing(session: Session, subject: Subject) -> Floats:
+    if session.facing_deg is None or not any(track.magnetometer for track in subject.tracks.values()):
+        return rotation.IDENTITY
+    return rotation.about(2, -radians(session.facing_deg))
+
+
+def _stated(session: Session) -> StatedAngles:
+    angles = {name: radians(value) for name, value in session.assumed_angles_deg.items()}
+    return StatedAngles(**angles) if angles else AS_STATED_BY_DEFAULT
+
+
+class Arms:
+    """The arms' memory, and the solving of rows."""
+
+    def __init__(self, settings: Settings) -> None:
+        self._printed = settings.filter == "complementary-printed"
+        self._tracker = AngleTracker()
+        self._index: dict[tuple[str, Side], int] = {}
+        self._frames: dict[int, Floats] = {}
+
+    def solve(self, rows: Sequence[Row]) -> list[Skeleton]:
+        """Return one skeleton a row, in the order of the rows."""
+        if not rows:
+            return []
+        left = np.array([row.side == "left" for row in rows])
+        world_from_sensor = _orientations(rows)
+        turn = np.array([row.turn for row in rows])
+        world_from_sensor = rotation.multiply(turn, world_from_sensor)
+        world_from_segment = rotation.multiply(
+            world_from_sensor, np.array([row.sensor_from_segment for row in rows])
+        )
+        trunk_from_world = np.array([row.trunk_from_world for row in rows])
+        thorax_known = np.array([row.sternum_aligned and row.readings[0] is not None for row in rows])
+        from_pose = None
+        if thorax_known.any():
+            thorax_from_world = rotation.inverse(world_from_segment[:, 0])
+            moving = rotation.multiply(TRUNK_FROM_THORAX, thorax_from_world)
+            world_from_pose = rotation.multiply(rotation.inverse(trunk_from_world), TRUNK_FROM_THORAX)
+            from_pose = rotation.multiply(rotation.inverse(world_from_pose), world_from_segment[:, 0])
+            from_pose[~thorax_known] = np.nan
+            trunk_from_world = np.where(thorax_known[:, None], moving, trunk_from_world)
+        in_trunk = rotation.multiply(trunk_from_world[:, None], world_from_segment[:, 1:])
+        measured = SegmentOrientations(in_trunk[:, 0], in_trunk[:, 1], in_trunk[:, 2])
+        known = known_set(measured)
+        full = measured
+        if not (known == 7).all():
+            full = complete(measured, left, _stated_rows(rows))
+        joints = between(full)
+        raw = joint_angles(*joints, left, calibration_from_thorax=from_pose)
+        codes = provenance(known, thorax_known)
+        angles = withhold(self._follow(rows, raw, joints.thorax_from_upper_arm, left), codes.angles)
+        drifting = np.array([row.withhold_heading for row in rows])
+        if drifting.any():
+            angles[np.ix_(drifting, _ON_HEADING)] = np.nan
+        places = withhold(
+            positions(*full, np.array([np.asarray(row.lengths) for row in rows]), left), codes.positions
+        )
+        return _messages(
+            rows,
+            world_from_sensor,
+            world_from_segment,
+            trunk_from_world,
+            angles,
+            codes.angles,
+            places,
+            codes.positions,
+        )
+
+    def _follow(
+        self, rows: Sequence[Row], raw: Floats, thorax_from_upper_arm: Floats, left: npt.NDArray[np.bool_]
+    ) -> Floats:
+        """Let each arm's angles follow its last ones, its rows in order of time."""
+        arms = np.array([self._arm(row.subject, row.side) for row in rows])
+        self._tracker.grow(len(self._index))
+        result = np.empty_like(raw)
+        turns = _turns(arms)
+        for turn in range(int(turns.max()) + 1):
+            now = turns == turn
+            result[now] = self._tracker.step(arms[now], raw[now], thorax_from_upper_arm[now], left[now])
+        return result
+
+    def _arm(self, subject: str, side: Side) -> int:
+        return self._index.setdefault((subject, side), len(self._index))
+
+    def state(self, subject: str) -> dict[str, Any]:
+        """Return the memory of one subject's arms, as plain values: NaN (nothing yet) as None."""
+        last = self._tracker.state()
+        return {
+            side: [None if np.isnan(v) else v for v in last[i].tolist()]
+            for (who, side), i in self._index.items()
+            if who == subject and i < len(last)
+        }
+
+    def restore(self, subject: str, state: dict[str, Any]) -> None:
+        """Go on as the arms whose memory this is would have."""
+        rows = {
+            self._arm(subject, side): [np.nan if v is None else v for v in values]
+            for side, values in state.items()
+            if side in SIDES
+        }
+        self._tracker.grow(len(self._index))
+        last = self._tracker.state()
+        for index, values in rows.items():
+            last[index] = values
+        self._tracker.restore(last)
+
+
+def _orientations(rows: Sequence[Row]) -> Floats:
+    """Return world_from_sensor (n, 4 slots, 4) at the rows' instants, NaN where nothing is known."""
+    before, after, fraction = [], [], []
+    for row in rows:
+        for reading in row.readings:
+            if reading is None:
+                before.append(_NOTHING)
+                after.append(_NOTHING)
+                fraction.append(0.0)
+            else:
+                before.append(reading.before)
+                after.append(reading.after)
+                fraction.append(reading.fraction)
+    return rotation.slerp(np.array(before), np.array(after), np.array(fraction)).reshape(-1, _SLOTS, 4)
+
+
+def _turns(arms: npt.NDArray[np.intp]) -> npt.NDArray[np.intp]:
+    """Return for each row how many rows of the same arm stand before it."""
+    seen: dict[int, int] = {}
+    turns = np.empty(len(arms), dtype=np.intp)
+    for i, arm in enumerate(arms.tolist()):
+        turns[i] = seen[arm] = seen.get(arm, -1) + 1
+    return turns
+
+
+def _stated_rows(rows: Sequence[Row]) -> StatedAngles:
+    return StatedAngles(
+        elbow_flexion=np.array([row.stated.elbow_flexion for row in rows]),
+        forearm_pronation=np.array([row.stated.forearm_pronation for row in rows]),
+        wrist_flexion=np.array([row.stated.wrist_flexion for row in rows]),
+        wrist_deviation=np.array([row.stated.wrist_deviation for row in rows]),
+    )
+
+
+# -- messages ----------------------------------------------------------------------------------------------------
+
+_NEEDS: dict[str, tuple[int, ...]] = {
+    **dict.fromkeys(SHOULDER, (0, 1)),
+    **dict.fromkeys(ELBOW, (1, 2)),
+    **dict.fromkeys(WRIST, (2, 3)),
+    **dict.fromkeys(TRUNK, (0,)),
+    **dict.fromkeys(CLAVICLE, (1, 2)),
+    "shoulder": (0,),
+    "elbow": (0, 1),
+    "wrist": (0, 1, 2),
+    "hand": (0, 1, 2, 3),
+}
+"""Which slots an angle or position rests on."""
+
+
+def _messages(
+    rows: Sequence[Row],
+    world_from_sensor: Floats,
+    world_from_segment: Floats,
+    trunk_from_world: Floats,
+    angles: Floats,
+    angle_codes: npt.NDArray[np.uint8],
+    places: Floats,
+    place_codes: npt.NDArray[np.uint8],
+) -> list[Skeleton]:
+    sensors, segments = world_from_sensor.tolist(), world_from_segment.tolist()
+    trunks, values, points = trunk_from_world.tolist(), angles.tolist(), places.tolist()
+    rests_on = ((angle_codes == ASSUMED).any(axis=1) | (place_codes == ASSUMED).any(axis=1)).tolist()
+    skeletons = []
+    for i, row in enumerate(rows):
+        poses: dict[str, SegmentPose] = {}
+        for slot, segment in enumerate(("sternum", *arm_segments(row.side))):
+            quality = row.qualities[slot]
+            reading = row.readings[slot]
+            if quality is None:
+                continue
+            if reading is None:
+                poses[segment] = SegmentPose(quality="missing")
+            else:
+                poses[segment] = SegmentPose(
+                    quality=quality,
+                    sequence=reading.sequence,
+                    world_from_segment=tuple(segments[i][slot]),
+                    world_from_sensor=tuple(sensors[i][slot]),
+                )
+        given = {name: value for name, value in zip(COLUMNS, values[i], strict=True) if value == value}
+        known = {name: tuple(p) for name, p in zip(JOINTS, points[i], strict=True) if p[0] == p[0]}
+        assumed: dict[str, Quality] = {}
+        if rests_on[i] or any(q is not None and q != "good" for q in row.qualities):
+            assumed = _qualities(row.qualities, angle_codes[i], place_codes[i], given.keys() | known.keys())
+        skeletons.append(
+            Skeleton(
+                time_ns=row.time_ns,
+                side=row.side,
+                origin=row.origin,
+                forward=row.forward,
+                trunk_from_world=tuple(trunks[i]),
+                segments=poses,
+                positions=known,
+                angles=given,
+                assumed=assumed,
+                received_ns=row.received_ns,
+            )
+        )
+    return skeletons
+
+
+def _qualities(
+    slots: tuple[Quality | None, ...],
+    angle_codes: npt.NDArray[np.uint8],
+    place_codes: npt.NDArray[np.uint8],
+    names: set[str],
+) -> dict[str, Quality]:
+    """Return the quality of every named angle and position that is not plainly good."""
+    codes = dict(zip((*COLUMNS, *JOINTS), (*angle_codes.tolist(), *place_codes.tolist()), strict=True))
+    result: dict[str, Quality] = {}
+    for name in (*COLUMNS, *JOINTS):
+        if name not in names:
+            continue
+        if codes[name] == ASSUMED:
+            result[name] = "assumed"
+            continue
+        worst = max((slots[s] or "good" for s in _NEEDS[name]), key=_RANK.__getitem__)
+        if worst != "good":
+            result[name] = worst
+    return result

@@ -1,0 +1,127 @@
+"""The heart: messages in, skeletons out. A value: no socket, thread, clock, file or environment.
+
+The live service, playback, the offline solver and the tests run this same object. Feed it every message in order
+of arrival; after each it solves what became solvable, so that how messages were bunched on their way plays no part.
+Orientations are found sample by sample as they come; the kinematics of all arms wait for `skeletons`, which solves
+everything that piled up in one go over arrays of arms.
+"""
+
+from collections import Counter
+from typing import Any, NamedTuple
+
+import msgpack
+
+from brachium_fusion.arms import Arms, Row, rows_of
+from brachium_fusion.subject import Change, Settings, Subject
+from brachium_wire import keys
+from brachium_wire.codec import WireError, decode, decode_topic, encode
+from brachium_wire.messages import Calibration, Info, SampleBatch, Skeleton, Snapshot
+from brachium_wire.samples import Samples, read_samples
+from brachium_wire.topics import TOPICS
+
+_IMU_BYTES = TOPICS["imu"].max_bytes
+
+
+class Solved(NamedTuple):
+    """A skeleton and whose it is."""
+
+    subject: str
+    skeleton: Skeleton
+
+
+class Pipeline:
+    """Many subjects at once. Drops are counted by reason, per subject and for the whole."""
+
+    def __init__(self, settings: Settings | None = None) -> None:
+        self.settings = settings or Settings()
+        self.subjects: dict[str, Subject] = {}
+        self.drops: Counter[str] = Counter()
+        """What could not be given to any subject."""
+        self.calibrations: list[tuple[str, Calibration]] = []
+        """News of calibrations since they were last taken away."""
+        self._arms = Arms(self.settings)
+        self._rows: list[Row] = []
+
+    def feed(self, key: keys.Key, payload: bytes) -> None:
+        """Take the bytes of a sensor's `imu` or `info` topic; other topics do not concern it."""
+        if key.topic == "imu":
+            try:
+                samples = read_samples(decode(payload, SampleBatch, _IMU_BYTES))
+            except WireError as error:
+                self._refuse(key, error)
+                return
+            self.samples(key.subject, key.detail, samples)
+        elif key.topic == "info":
+            try:
+                info = decode_topic(payload, "info")
+            except WireError as error:
+                self._refuse(key, error)
+                return
+            assert isinstance(info, Info)
+            self.subject(key.subject).inform(key.detail, info)
+
+    def samples(self, subject_id: str, segment: str, samples: Samples) -> None:
+        """Take a batch of samples."""
+        subject = self.subject(subject_id)
+        subject.feed(segment, samples)
+        self._collect(subject_id, subject)
+
+    def apply(self, subject_id: str, change: Change) -> None:
+        """Take a change of a subject's session, or the wish for a calibration."""
+        self.subject(subject_id).apply(change)
+
+    def finish(self) -> None:
+        """Nothing more will come: solve what still waited."""
+        for subject_id, subject in self.subjects.items():
+            subject.finish()
+            self._collect(subject_id, subject)
+
+    def skeletons(self) -> list[Solved]:
+        """Return the skeletons of every instant solved since the last call, each subject's in order of time."""
+        rows, self._rows = self._rows, []
+        return [
+            Solved(row.subject, skeleton) for row, skeleton in zip(rows, self._arms.solve(rows), strict=True)
+        ]
+
+    def subject(self, subject_id: str) -> Subject:
+        """Return one subject; it begins with its first message."""
+        subject = self.subjects.get(subject_id)
+        if subject is None:
+            subject = Subject(self.settings, lambda news: self.calibrations.append((subject_id, news)))
+            self.subjects[subject_id] = subject
+        return subject
+
+    def snapshot(self, subject_id: str) -> bytes:
+        """Return a Snapshot message of one subject: settings and whole state after all that was fed.
+
+        Call it when `skeletons` has taken everything; rows that still wait are not part of it.
+        """
+        subject = self.subject(subject_id)
+        state = {"subject": subject.state(), "arms": self._arms.state(subject_id)}
+        settings = self.settings
+        return encode(
+            Snapshot(
+                time_ns=subject.received_ns,
+                settings={
+                    "filter": settings.filter,
+                    "magnetometer": settings.magnetometer,
+                    "rate_hz": settings.rate_hz,
+                    "auto_pose": settings.auto_pose,
+                },
+                state=msgpack.packb(state),
+            )
+        )
+
+    def restore(self, subject_id: str, snapshot: Snapshot) -> None:
+        """Put one subject back to where a snapshot was taken."""
+        state: dict[str, Any] = msgpack.unpackb(snapshot.state, strict_map_key=False)
+        self.subject(subject_id).restore(state["subject"])
+        self._arms.restore(subject_id, state["arms"])
+
+    def _collect(self, subject_id: str, subject: Subject) -> None:
+        for instant in subject.instants():
+            self._rows.extend(rows_of(subject_id, subject, instant))
+
+    def _refuse(self, key: keys.Key, error: WireError) -> None:
+        subject = self.subjects.get(key.subject)
+        (self.drops if subject is None else subject.drops)[error.drop.value] += 1

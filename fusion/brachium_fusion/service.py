@@ -1,0 +1,207 @@
+"""The live fusion service: bus -> pipeline -> bus. All decisions are the pipeline's; this only carries."""
+
+import logging
+import threading
+import time
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import msgspec
+
+from brachium_fusion.pipeline import Pipeline
+from brachium_fusion.pose import POSES, pose_orientations
+from brachium_fusion.subject import POSE_PATIENCE_S, STILL_S, Change, Settings
+from brachium_wire import keys
+from brachium_wire.bus import DEFAULT_ENDPOINT, Bus, Inbox
+from brachium_wire.codec import Drop, WireError, decode, decode_topic, encode
+from brachium_wire.heart import Heart
+from brachium_wire.messages import Answer, Calibration, Command, Event, Session
+
+log = logging.getLogger(__name__)
+
+DRAIN_S = 0.01
+"""How often arrivals are taken. Half of it is what a skeleton waits on average; each costs a wake-up."""
+
+Reply = Callable[[bytes], None]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FuseSettings:
+    """What `brachium fuse` takes."""
+
+    endpoint: str = DEFAULT_ENDPOINT
+    room: str = "room"
+    service_id: str = "fusion"
+    pipeline: Settings = field(default_factory=Settings)
+
+
+def run(settings: FuseSettings, stop: threading.Event) -> None:
+    """Serve until `stop` is set."""
+    with Bus.open(settings.endpoint, stop=stop, timeout_s=None) as bus:
+        service = FusionService(bus, settings)
+        while not stop.wait(DRAIN_S):
+            service.turn()
+        service.close()
+
+
+class FusionService:
+    """One turn drains what arrived, lets the pipeline solve it and publishes what came out."""
+
+    def __init__(self, bus: Bus, settings: FuseSettings) -> None:
+        self._bus, self._room = bus, settings.room
+        self._pipeline = Pipeline(settings.pipeline)
+        self._heart = Heart(bus, settings.room, "fusion", settings.service_id)
+        self._door: Counter[str] = Counter()
+        """What was refused before it reached a subject."""
+        self._inbox: Inbox = bus.subscribe(keys.subjects(settings.room, "imu/**"))
+        self._sessions: Inbox = bus.subscribe(keys.subjects(settings.room, "session"))
+        self._asked: list[tuple[keys.Key, bytes, Reply]] = []
+        self._lock = threading.Lock()
+        self._waiting: dict[str, list[tuple[float, Reply]]] = {}
+        for verb in ("calibrate", "record"):
+            bus.serve_later(keys.commands(settings.room, verb), self._on_command)
+        for tail in ("imu/*/info", "session"):
+            for key, payload in bus.fetch(keys.subjects(settings.room, tail)):
+                self._heard(key, payload)
+
+    def turn(self) -> None:
+        """Take what arrived, publish what it gives."""
+        for key, payload in self._inbox.drain():
+            self._heard(key, payload)
+        for key, payload in self._sessions.drain():
+            self._heard(key, payload)
+        self._publish()
+        with self._lock:
+            asked, self._asked = self._asked, []
+        for parsed, question, reply in asked:
+            self._answer(parsed, question, reply)
+        self._give_up()
+        self._beat()
+
+    def close(self) -> None:
+        """Tell the last health and who still waits for an answer."""
+        for replies in self._waiting.values():
+            for _, reply in replies:
+                reply(encode(Answer(ok=False, reason="fusion is stopping")))
+        self._waiting.clear()
+        self._beat(now=True)
+        self._heart.end()
+
+    def _heard(self, key: str, payload: bytes) -> None:
+        try:
+            parsed = keys.parse(key)
+            if parsed.topic == "session":
+                session = decode_topic(payload, "session")
+                assert isinstance(session, Session)
+                self._apply(parsed.subject, "session", msgspec.to_builtins(session))
+            else:
+                self._pipeline.feed(parsed, payload)
+        except keys.BadKey:
+            self._door[Drop.BAD_KEY.value] += 1
+        except WireError as error:
+            self._door[error.drop.value] += 1
+
+    def _publish(self) -> None:
+        for solved in self._pipeline.skeletons():
+            skeleton = solved.skeleton
+            self._bus.put(keys.skeleton(self._room, solved.subject, skeleton.side), encode(skeleton))
+            self._heart.counts["skeletons"] += 1
+        news, self._pipeline.calibrations = self._pipeline.calibrations, []
+        for subject, calibration in news:
+            self._bus.retain(keys.calibration(self._room, subject), encode(calibration))
+            for warning in calibration.warnings:
+                log.warning("%s: %s", subject, warning)
+            if calibration.state in ("done", "refused"):
+                self._finish_calibration(subject, calibration)
+
+    # -- commands ------------------------------------------------------------------------------------------------
+
+    def _on_command(self, key: str, question: bytes, reply: Reply) -> None:
+        """Runs on Zenoh's thread: only keeps the question for the next turn."""
+        try:
+            parsed = keys.parse(key)
+        except keys.BadKey as error:
+            reply(encode(Answer(ok=False, reason=str(error))))
+            return
+        with self._lock:
+            self._asked.append((parsed, question, reply))
+
+    def _answer(self, key: keys.Key, question: bytes, reply: Reply) -> None:
+        try:
+            command = decode(question, Command) if question else Command()
+            if key.subject not in self._pipeline.subjects:
+                raise ValueError(f"no sensor of subject {key.subject!r} has been heard yet")
+            if key.detail == "record":
+                snapshot = self._pipeline.snapshot(key.subject)
+                reply(encode(Answer(ok=True, data={"snapshot": snapshot})))
+            else:
+                self._begin_calibration(key.subject, command, reply)
+        except (WireError, ValueError, TypeError) as error:
+            reply(encode(Answer(ok=False, reason=str(error))))
+
+    def _begin_calibration(self, subject: str, command: Command, reply: Reply) -> None:
+        wish = _wish(command)
+        self._waiting.setdefault(subject, []).append(
+            (time.monotonic() + wish["seconds"] + POSE_PATIENCE_S + 5, reply)
+        )
+        self._apply(subject, "calibrate", wish)
+
+    def _apply(self, subject: str, kind: str, data: dict[str, object]) -> None:
+        """Apply a change from the next tick on, and say so on the bus: a recording repeats it at that tick."""
+        change = Change(self._pipeline.subject(subject).next_tick_ns(), kind, data)
+        self._pipeline.apply(subject, change)
+        event = Event(time_ns=change.from_ns, kind="applied", text=kind, data=data)
+        self._bus.put(keys.event(self._room, subject), encode(event))
+
+    def _finish_calibration(self, subject: str, calibration: Calibration) -> None:
+        answer = Answer(
+            ok=calibration.state == "done",
+            reason=calibration.reason,
+            data={
+                "forward": calibration.forward,
+                "scores": calibration.scores,
+                "warnings": calibration.warnings,
+            },
+        )
+        for _, reply in self._waiting.pop(subject, ()):
+            reply(encode(answer))
+
+    def _give_up(self) -> None:
+        now = time.monotonic()
+        for subject, replies in list(self._waiting.items()):
+            for entry in [r for r in replies if r[0] < now]:
+                replies.remove(entry)
+                entry[1](encode(Answer(ok=False, reason="no samples arrive: nothing to calibrate from")))
+            if not replies:
+                del self._waiting[subject]
+
+    def _beat(self, *, now: bool = False) -> None:
+        heart = self._heart
+        heart.counts["subjects"] = len(self._pipeline.subjects)
+        heart.counts["batches"] = self._inbox.received
+        heart.drops = self._door + self._pipeline.drops
+        for subject in self._pipeline.subjects.values():
+            heart.drops += subject.drops
+        if self._inbox.dropped:
+            heart.drops["inbox_overflow"] = self._inbox.dropped
+        heart.beat(now=now)
+
+
+def _wish(command: Command) -> dict[str, object]:
+    """Return the checked arguments of `calibrate`, or raise ValueError saying what may be asked."""
+    arguments = dict(command.arguments)
+    pose, seconds = arguments.pop("pose", "n-pose"), arguments.pop("seconds", STILL_S)
+    angles = arguments.pop("angles_deg", {})
+    if arguments:
+        raise ValueError(
+            f"calibrate does not know {sorted(arguments)[0]!r}; it takes pose, seconds, angles_deg"
+        )
+    if pose not in POSES:
+        raise ValueError(f"pose {pose!r} is not known; poses are {', '.join(POSES)}")
+    if not isinstance(seconds, int | float) or not 1.0 <= seconds <= 30.0:
+        raise ValueError(f"seconds must be 1 to 30, not {seconds!r}")
+    if not isinstance(angles, dict):
+        raise ValueError("angles_deg must be a map from an angle's name to degrees")
+    pose_orientations(pose, angles)
+    return {"pose": pose, "seconds": float(seconds), "angles_deg": angles}

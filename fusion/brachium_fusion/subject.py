@@ -1,0 +1,380 @@
+"""One person's sensors: which instant can be solved, what each segment's orientation is there, and when a
+calibration pose was held. Pure; every decision rests on this subject's own messages, in order of arrival, and on
+changes stamped with the instant from which they hold. So a recording of them gives the same skeletons again.
+"""
+
+from collections import Counter, deque
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+import msgspec
+import numpy as np
+import numpy.typing as npt
+
+from brachium_body.segments import SEGMENTS, Side
+from brachium_fusion.orientation import FilterName
+from brachium_fusion.pose import Alignment, PoseName, PoseSensor, align, pose_orientations
+from brachium_fusion.track import Reading, SegmentTrack
+from brachium_wire.codec import Drop
+from brachium_wire.messages import Calibration, Info, Quality, Session
+from brachium_wire.samples import Samples
+
+Floats = npt.NDArray[np.float64]
+
+HELD_NS = 150_000_000
+"""A segment this far behind the newest arrival, beyond its own batches, no longer holds the others up."""
+MISSING_NS = 500_000_000
+"""A segment this far behind is missing: its last orientation says nothing any more."""
+STILL_S = 3.0
+"""A pose counts once all sensors were still for this long."""
+POSE_USED_NS = 2_000_000_000
+"""Of the pose, the last two seconds are used: the filters have settled by then."""
+POSE_PATIENCE_S = 30.0
+"""A pose that was asked for is refused when nobody stood still for this long."""
+HOST_GONE_NS = 2_000_000_000
+"""Another host may take a subject over once the first was silent for this long."""
+WAITING_BATCHES = 64
+"""Batches kept for a segment whose info has not come yet."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Settings:
+    """What one chooses of the pipeline."""
+
+    filter: FilterName = "auto"
+    magnetometer: bool = True
+    """False leaves magnetometers aside."""
+    rate_hz: float = 50.0
+    """Skeletons a second, on multiples of the period in host time."""
+    auto_pose: bool = True
+    """Take the first stillness of all sensors as the n-pose."""
+
+
+class Change(NamedTuple):
+    """Something that is not a sample and holds from an instant on."""
+
+    from_ns: int
+    kind: str
+    """`session` or `calibrate`."""
+    data: dict[str, Any]
+
+
+@dataclass(slots=True)
+class _Pose:
+    """A pose that is waited for."""
+
+    pose: PoseName = "n-pose"
+    seconds: float = STILL_S
+    angles_deg: dict[str, float] = field(default_factory=dict)
+    from_ns: int = 0
+    patient: bool = True
+    """It is never refused."""
+
+
+class Instant(NamedTuple):
+    """What is known of every segment at one tick."""
+
+    time_ns: int
+    readings: dict[str, Reading | None]
+    """None: the segment has a sensor, and it is missing."""
+    received_ns: int
+    alignment: Alignment | None
+    session: Session
+
+
+class Subject:
+    """All that changes for one person. `feed` takes batches, `instants` gives what became solvable."""
+
+    def __init__(self, settings: Settings, announce: Callable[[Calibration], None]) -> None:
+        self._settings = settings
+        self._announce = announce
+        self._period_ns = round(1e9 / settings.rate_hz)
+        self._times: deque[int] | None = None
+        self._next_ns: int | None = None
+        self._ended = False
+        self._pending: list[Change] = []
+        self._unclaimed: dict[str, deque[Samples]] = {}
+        self._host: str | None = None
+        self._pose: _Pose | None = _Pose() if settings.auto_pose else None
+        self._held: dict[str, list[tuple[int, Floats]]] = {}
+        self.tracks: dict[str, SegmentTrack] = {}
+        self.received_ns = 0
+        self.alignment: Alignment | None = None
+        self.reference_ns = 0
+        """When headings were last set by a pose."""
+        self.session = Session()
+        self.drops: Counter[str] = Counter()
+        self.frames: dict[Side, Any] = {}
+        """Kept by arms.py for each arm between two calibrations; follows from the rest."""
+
+    # -- what comes in -------------------------------------------------------------------------------------------
+
+    def inform(self, segment: str, info: Info) -> None:
+        """Take what is known of a segment's sensor. A changed sensor begins a new track."""
+        if segment not in SEGMENTS:
+            self.drops[Drop.UNKNOWN_SEGMENT.value] += 1
+            return
+        if self._host is not None and info.host != self._host:
+            if not self._host_is_gone():
+                self.drops[Drop.SECOND_HOST.value] += 1
+                return
+            self.tracks.clear()
+            self._next_ns = None
+        self._host = info.host
+        track = self.tracks.get(segment)
+        if track is not None and track.info == info:
+            return
+        self.tracks[segment] = SegmentTrack(info, self._settings.filter, self._settings.magnetometer)
+        self._held.pop(segment, None)
+        for samples in self._unclaimed.pop(segment, ()):
+            self.feed(segment, samples)
+
+    def _host_is_gone(self) -> bool:
+        return not self.tracks or all(
+            self.received_ns - track.last_ns > HOST_GONE_NS for track in self.tracks.values()
+        )
+
+    def feed(self, segment: str, samples: Samples) -> None:
+        """Take a batch of samples of one segment."""
+        track = self.tracks.get(segment)
+        if track is None:
+            if segment not in SEGMENTS:
+                self.drops[Drop.UNKNOWN_SEGMENT.value] += len(samples)
+                return
+            waiting = self._unclaimed.setdefault(segment, deque(maxlen=WAITING_BATCHES))
+            if len(waiting) == WAITING_BATCHES:
+                self.drops[Drop.NO_INFO.value] += len(waiting[0])
+            waiting.append(samples)
+            return
+        self.received_ns = max(self.received_ns, samples.received_ns)
+        if track.feed(samples, self.drops) and self._next_ns is None:
+            self._next_ns = self._first_tick(track.first_ns)
+
+    def apply(self, change: Change) -> None:
+        """Take a change that holds from `change.from_ns` on."""
+        self._pending.append(change)
+        self._pending.sort(key=lambda c: c.from_ns)
+
+    def pending(self) -> list[Change]:
+        """Return the changes whose instant has not come."""
+        return list(self._pending)
+
+    def use_instants(self, times_ns: Sequence[int]) -> None:
+        """Solve at these instants instead of the grid."""
+        self._times = deque(times_ns)
+
+    def finish(self) -> None:
+        """Nothing more will come: what was waited for is missing."""
+        self._ended = True
+
+    # -- what can be solved --------------------------------------------------------------------------------------
+
+    def next_tick_ns(self) -> int:
+        """Return the next instant that will be solved, 0 before the first sample."""
+        return self._next_ns or 0
+
+    def instants(self) -> Iterator[Instant]:
+        """Yield every instant that can be solved now, in order."""
+        while self._next_ns is not None:
+            now = self._next_ns
+            readings = self._readings(now)
+            if readings is None:
+                return
+            if not any(readings.values()):
+                self._next_ns = self._skip(now)
+                continue
+            self._next_ns = self._following(now)
+            self._apply_pending(now)
+            self._watch_pose(now, readings)
+            yield Instant(
+                now,
+                readings,
+                max(r.received_ns for r in readings.values() if r is not None),
+                self.alignment,
+                self.session,
+            )
+            for track in self.tracks.values():
+                track.forget(now)
+
+    def _readings(self, now: int) -> dict[str, Reading | None] | None:
+        """Return every segment's orientation, or None while one that is alive has not come so far."""
+        begun = [
+            (s, t, self.received_ns - t.last_ns - t.batch_ns) for s, t in self.tracks.items() if t.last_ns
+        ]
+        reached = [t.last_ns >= now for _, t, _ in begun]
+        patience = -(1 << 62) if self._ended else HELD_NS
+        if not any(reached) or any(
+            behind <= patience for (_, _, behind), there in zip(begun, reached, strict=True) if not there
+        ):
+            return None
+        readings: dict[str, Reading | None] = {}
+        for (segment, track, behind), there in zip(begun, reached, strict=True):
+            if there:
+                readings[segment] = track.at(now)
+            else:
+                readings[segment] = None if self._ended or behind > MISSING_NS else track.latest()
+        return readings
+
+    def _first_tick(self, time_ns: int) -> int | None:
+        if self._times is None:
+            return -(-time_ns // self._period_ns) * self._period_ns
+        return self._following(0)
+
+    def _following(self, now: int) -> int | None:
+        if self._times is None:
+            return now + self._period_ns
+        return self._times.popleft() if self._times else None
+
+    def _skip(self, now: int) -> int | None:
+        """Return the next tick after a stretch in which nothing was measured."""
+        if self._times is not None:
+            return self._following(now)
+        begins = [t for t in (track.next_sample_ns(now) for track in self.tracks.values()) if t is not None]
+        return max(
+            now + self._period_ns, -(-min(begins) // self._period_ns) * self._period_ns if begins else 0
+        )
+
+    # -- changes and poses ---------------------------------------------------------------------------------------
+
+    def _apply_pending(self, now: int) -> None:
+        while self._pending and self._pending[0].from_ns <= now:
+            change = self._pending.pop(0)
+            if change.kind == "session":
+                self.session = msgspec.convert(change.data, Session)
+            else:
+                self._pose = _Pose(from_ns=now, patient=False, **change.data)
+                self._held.clear()
+                self._say(now, "waiting", reason="stand still in the pose")
+
+    def _watch_pose(self, now: int, readings: dict[str, Reading | None]) -> None:
+        pose = self._pose
+        if pose is None:
+            return
+        live = {s: r for s, r in readings.items() if r is not None and r.quality in ("good", "disturbed")}
+        start = max((self.tracks[s].still_since_ns for s in live), default=now + 1)
+        start = max(start, pose.from_ns)
+        if start > now:
+            self._held.clear()
+        else:
+            for segment, reading in live.items():
+                # Still: the sample next to the instant is as good as one in between, and costs nothing.
+                self._held.setdefault(segment, []).append((now, reading.after))
+            if now - start >= pose.seconds * 1e9:
+                self._take_pose(now, pose)
+                return
+        if not pose.patient and now - pose.from_ns > (POSE_PATIENCE_S + pose.seconds) * 1e9:
+            moving = max(live, key=lambda s: self.tracks[s].still_since_ns, default="no sensor")
+            self._pose = None
+            self._say(
+                now,
+                "refused",
+                pose=pose.pose,
+                reason=f"{moving} was not still for {pose.seconds:g} s within {POSE_PATIENCE_S:g} s; "
+                "stand still (slower than 0.15 rad/s) and ask again",
+            )
+
+    def _take_pose(self, now: int, pose: _Pose) -> None:
+        used = {s: [q for t, q in held if t >= now - POSE_USED_NS] for s, held in self._held.items()}
+        self._pose = None
+        self._held.clear()
+        self.take_alignment(now, {s: np.array(q) for s, q in used.items() if q}, pose.pose, pose.angles_deg)
+
+    def take_alignment(
+        self,
+        now: int,
+        world_from_sensor: dict[str, Floats],
+        pose: PoseName,
+        angles_deg: dict[str, float],
+        elbow_axis: dict[str, Floats] | None = None,
+    ) -> None:
+        """Align every segment from its orientations (k, 4) while the pose was held, from now on."""
+        sensors = {
+            segment: PoseSensor(
+                world_from_sensor=quats,
+                magnetometer=self.tracks[segment].magnetometer or self.tracks[segment].info.orientation_only,
+                nominal_mounting=_array(self.tracks[segment].info.mounting),
+            )
+            for segment, quats in world_from_sensor.items()
+        }
+        self.alignment = align(
+            sensors,
+            pose_orientations(pose, angles_deg),
+            facing_deg=self.session.facing_deg,
+            elbow_axis=elbow_axis,
+        )
+        self.reference_ns = now
+        self._say(now, "done", pose=pose)
+
+    def _say(self, now: int, state: str, pose: str = "", reason: str = "") -> None:
+        alignment = self.alignment if state == "done" and self.alignment is not None else Alignment()
+        self._announce(
+            Calibration(
+                time_ns=now,
+                state=state,  # type: ignore[arg-type]
+                pose=pose,
+                progress=1.0 if state == "done" else 0.0,
+                reason=reason,
+                forward=alignment.forward,
+                mounting={s: _quaternion(q) for s, q in alignment.mounting.items()},
+                scores=alignment.scores,
+                warnings=list(alignment.warnings),
+            )
+        )
+
+    # -- snapshot ------------------------------------------------------------------------------------------------
+
+    def state(self) -> dict[str, Any]:
+        """Return all that changes, as plain values."""
+        return {
+            "next_ns": self._next_ns,
+            "host": self._host,
+            "pending": [[c.from_ns, c.kind, c.data] for c in self._pending],
+            "pose": None if self._pose is None else msgspec.to_builtins(self._pose),
+            "held": {s: [[t, q.tolist()] for t, q in rows] for s, rows in self._held.items()},
+            "tracks": {s: [msgspec.to_builtins(t.info), t.state()] for s, t in self.tracks.items()},
+            "received_ns": self.received_ns,
+            "alignment": None if self.alignment is None else self.alignment.state(),
+            "reference_ns": self.reference_ns,
+            "session": msgspec.to_builtins(self.session),
+        }
+
+    def restore(self, state: dict[str, Any]) -> None:
+        """Go on as the subject whose state this is would have."""
+        self._next_ns, self._host = state["next_ns"], state["host"]
+        self._pending = [Change(*c) for c in state["pending"]]
+        self._pose = None if state["pose"] is None else _Pose(**state["pose"])
+        self._held = {s: [(t, np.array(q)) for t, q in rows] for s, rows in state["held"].items()}
+        self.tracks = {}
+        for segment, (info, track_state) in state["tracks"].items():
+            track = SegmentTrack(
+                msgspec.convert(info, Info), self._settings.filter, self._settings.magnetometer
+            )
+            track.restore(track_state)
+            self.tracks[segment] = track
+        self.received_ns = state["received_ns"]
+        self.alignment = None if state["alignment"] is None else Alignment.from_state(state["alignment"])
+        self.reference_ns = state["reference_ns"]
+        self.session = msgspec.convert(state["session"], Session)
+
+
+def segment_quality(reading: Reading | None, alignment: Alignment | None, segment: str) -> Quality:
+    """Return the quality of one segment at an instant: the worst of how it was measured and how it was aligned."""
+    if reading is None:
+        return "missing"
+    if reading.quality == "held":
+        return "held"
+    if alignment is None or segment not in alignment.mounting:
+        return "uncalibrated"
+    if segment in alignment.assumed:
+        return "heading_assumed"
+    return reading.quality
+
+
+def _array(values: Sequence[float] | None) -> Floats | None:
+    return None if values is None else np.array(values, dtype=np.float64)
+
+
+def _quaternion(q: Floats) -> tuple[float, float, float, float]:
+    w, x, y, z = q.tolist()
+    return (w, x, y, z)

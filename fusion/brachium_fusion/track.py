@@ -1,0 +1,264 @@
+"""One segment's sensor over time: batches in, orientation at any instant within what was received. Pure."""
+
+from bisect import bisect_left
+from collections import Counter, deque
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from brachium_body import rotation
+from brachium_fusion.orientation import FilterName, OrientationFilter, make
+from brachium_wire.codec import Drop
+from brachium_wire.messages import Info, Quality
+from brachium_wire.samples import Samples
+from brachium_wire.sequence import SequenceCounter
+
+Floats = npt.NDArray[np.float64]
+
+BRIDGE_NS = 100_000_000
+"""A gap up to this is bridged by interpolation when its far end is there, and marked held."""
+RESTART_NS = 1_000_000_000
+"""After a longer gap the filter starts anew: what it would carry over is further off than a fresh start."""
+STILL_RAD_S = 0.15
+"""A sensor turning slower than this is still: above hand tremor and sway, far below any movement."""
+DISTURBED_NS = 2_000_000_000
+"""A magnetic disturbance is reported once it lasted this long; brushing past a chair is not worth a flag."""
+
+
+class Reading(NamedTuple):
+    """The orientation at an instant lies at `fraction` of the way between two samples."""
+
+    before: Floats
+    after: Floats
+    fraction: float
+    quality: Quality
+    sequence: int
+    received_ns: int
+
+
+@dataclass(slots=True, eq=False)
+class _Block:
+    """A batch after the filter. Row 0 repeats the last sample before it."""
+
+    times: list[int]
+    quats: Floats
+    first_sequence: int
+    received_ns: int
+    gap: Quality | None
+    """What an instant between row 0 and the first new sample is: held, missing, or None where there is no gap."""
+    disturbed: bool
+
+
+class SegmentTrack:
+    """Everything about one sensor that changes. `feed` takes batches in order of arrival."""
+
+    def __init__(self, info: Info, filter_name: FilterName, use_magnetometer: bool) -> None:
+        self.info = info
+        self.magnetometer = info.magnetometer and use_magnetometer and not info.orientation_only
+        self.counter = SequenceCounter()
+        self.last_ns = 0
+        self.still_since_ns = 0
+        """All samples from here on were still; host time."""
+        self.batch_ns = 0
+        """The longest time that a recent batch spanned: how far behind a healthy sensor may seem."""
+        self._filter_name: FilterName = filter_name
+        self._filter = self._new_filter()
+        self._blocks: deque[_Block] = deque()
+        self._last_gyr: Floats | None = None
+        self._last_acc: Floats | None = None
+        self._disturbed_since: int | None = None
+        self.restarts = 0
+        """How often the filter lost its heading by a long gap."""
+        cal = info.calibration
+        self._gyro_bias = None if cal.gyro_bias is None else np.array(cal.gyro_bias)
+        self._accel_bias = np.array(cal.accel_bias or (0.0, 0.0, 0.0))
+        self._accel_scale = np.array(cal.accel_scale or (1.0, 1.0, 1.0))
+        self._calibrate_acc = cal.accel_bias is not None or cal.accel_scale is not None
+        self._mag_offset = np.array(cal.mag_offset or (0.0, 0.0, 0.0))
+        self._mag_matrix = np.eye(3) if cal.mag_matrix is None else np.array(cal.mag_matrix)
+        self._calibrate_mag = cal.mag_offset is not None or cal.mag_matrix is not None
+
+    def _new_filter(self) -> OrientationFilter:
+        return make(self._filter_name, 1.0 / self.info.rate_hz, self.magnetometer)
+
+    def feed(self, samples: Samples, drops: Counter[str]) -> bool:
+        """Take a batch; return False, with the reason counted in samples, when it cannot be used."""
+        n = len(samples)
+        if samples.late:
+            drops[Drop.LATE.value] += n
+            return False
+        gap = self.counter.feed(samples.sequence, n)
+        if gap < 0:
+            drops[Drop.OUT_OF_ORDER.value] += n
+            return False
+        if samples.time_ns[0] <= self.last_ns:
+            drops[Drop.TIME_BACKWARDS.value] += n
+            return False
+        if samples.quat is not None:
+            self._feed_orientation(samples)
+        else:
+            self._feed_inertial(samples, gap)
+        self.batch_ns = max(samples.time_ns[-1] - samples.time_ns[0], int(0.9 * self.batch_ns))
+        self.last_ns = samples.time_ns[-1]
+        return True
+
+    def _feed_inertial(self, samples: Samples, gap: int) -> None:
+        assert samples.gyr is not None
+        assert samples.acc is not None
+        gyr = samples.gyr if self._gyro_bias is None else samples.gyr - self._gyro_bias
+        acc = samples.acc
+        if self._calibrate_acc:
+            acc = (acc - self._accel_bias) * self._accel_scale
+        mag = samples.mag
+        if mag is not None and self._calibrate_mag:
+            mag = (mag - self._mag_offset) @ self._mag_matrix.T
+        silence = samples.time_ns[0] - self.last_ns if self._blocks else 0
+        kind: Quality | None = None
+        period_ns = 1e9 / self.info.rate_hz
+        missing = round(silence / period_ns) - 1 if gap or silence > 2.5 * period_ns else 0
+        if missing > 0 and self._blocks:
+            kind = "held" if silence <= BRIDGE_NS else "missing"
+            if silence > RESTART_NS:
+                self._filter = self._new_filter()
+                self.restarts += 1
+            else:
+                self._bridge(gyr[0], acc[0], missing)
+        quats = self._filter.update(gyr, acc, mag, samples.mag_index)
+        self._last_gyr, self._last_acc = gyr[-1], acc[-1]
+        self._note_still(gyr, samples.time_ns)
+        self._append(samples, quats, kind, self._is_disturbed(samples.time_ns[-1]))
+
+    def _bridge(self, gyr: Floats, acc: Floats, missing: int) -> None:
+        """Carry the filter over missing samples along a straight line between the ends of the gap."""
+        assert self._last_gyr is not None
+        assert self._last_acc is not None
+        part = (np.arange(1, missing + 1) / (missing + 1.0))[:, None]
+        self._filter.update(
+            self._last_gyr + part * (gyr - self._last_gyr),
+            self._last_acc + part * (acc - self._last_acc),
+            None,
+            None,
+        )
+
+    def _feed_orientation(self, samples: Samples) -> None:
+        quats = samples.quat
+        assert quats is not None
+        silence = samples.time_ns[0] - self.last_ns if self._blocks else 0
+        kind: Quality | None = None
+        if self._blocks and silence > 2.5e9 / self.info.rate_hz:
+            kind = "held" if silence <= BRIDGE_NS else "missing"
+        previous = self._blocks[-1].quats[-1] if self._blocks else quats[0]
+        steps = rotation.angle_between(np.vstack([previous, quats[:-1]]), quats) * self.info.rate_hz
+        self._note_still(np.column_stack([steps, np.zeros((len(steps), 2))]), samples.time_ns)
+        self._append(samples, quats, kind, disturbed=False)
+
+    def _note_still(self, gyr: Floats, times: list[int]) -> None:
+        turning = np.einsum("ij,ij->i", gyr, gyr) > STILL_RAD_S**2
+        if self.still_since_ns == 0:
+            self.still_since_ns = times[0]
+        if turning.any():
+            self.still_since_ns = times[int(np.flatnonzero(turning)[-1])] + 1
+
+    def _is_disturbed(self, now_ns: int) -> bool:
+        if not self._filter.disturbed:
+            self._disturbed_since = None
+            return False
+        if self._disturbed_since is None:
+            self._disturbed_since = now_ns
+        return now_ns - self._disturbed_since >= DISTURBED_NS
+
+    def _append(self, samples: Samples, quats: Floats, gap: Quality | None, disturbed: bool) -> None:
+        if self._blocks:
+            last = self._blocks[-1]
+            times = [last.times[-1], *samples.time_ns]
+            rows = np.concatenate([last.quats[-1:], quats])
+        else:
+            times, rows = [samples.time_ns[0], *samples.time_ns], np.concatenate([quats[:1], quats])
+        self._blocks.append(_Block(times, rows, samples.sequence, samples.received_ns, gap, disturbed))
+
+    @property
+    def first_ns(self) -> int:
+        """Host time of the oldest sample still held; 0 before any."""
+        return self._blocks[0].times[1] if self._blocks else 0
+
+    def at(self, time_ns: int) -> Reading | None:
+        """Return the orientation at an instant up to `last_ns`, or None where nothing was measured."""
+        for block in self._blocks:
+            if time_ns <= block.times[-1]:
+                break
+        else:
+            return None
+        after = max(bisect_left(block.times, time_ns), 1)
+        if time_ns < block.times[0] or (time_ns < block.times[1] and block.times[0] == block.times[1]):
+            return None
+        quality: Quality = "disturbed" if block.disturbed else "good"
+        if after == 1 and block.gap is not None and time_ns < block.times[1]:
+            if block.gap == "missing":
+                return None
+            quality = block.gap
+        t0, t1 = block.times[after - 1], block.times[after]
+        fraction = (time_ns - t0) / (t1 - t0) if t1 > t0 else 1.0
+        quats = block.quats
+        return Reading(
+            quats[after - 1],
+            quats[after],
+            fraction,
+            quality,
+            block.first_sequence + after - 1,
+            block.received_ns,
+        )
+
+    def next_sample_ns(self, after_ns: int) -> int | None:
+        """Return the time of the first sample later than an instant, or None while there is none."""
+        for block in self._blocks:
+            if block.times[-1] > after_ns:
+                return next(t for t in block.times[1:] if t > after_ns)
+        return None
+
+    def latest(self) -> Reading | None:
+        """Return the last orientation there is, marked held."""
+        if not self._blocks:
+            return None
+        block = self._blocks[-1]
+        sequence = block.first_sequence + len(block.times) - 2
+        return Reading(block.quats[-1], block.quats[-1], 0.0, "held", sequence, block.received_ns)
+
+    def forget(self, before_ns: int) -> None:
+        """Let go of batches that end before an instant; the last one is always kept."""
+        while len(self._blocks) > 1 and self._blocks[0].times[-1] < before_ns:
+            self._blocks.popleft()
+
+    def state(self) -> dict[str, Any]:
+        """Return all that changes, as plain values."""
+        counter = self.counter
+        return {
+            "counter": [counter.received, counter.lost, counter.out_of_order, counter.repeated, counter.next],
+            "last_ns": self.last_ns,
+            "still_since_ns": self.still_since_ns,
+            "batch_ns": self.batch_ns,
+            "filter": self._filter.state(),
+            "blocks": [
+                [b.times, b.quats.ravel().tolist(), b.first_sequence, b.received_ns, b.gap, b.disturbed]
+                for b in self._blocks
+            ],
+            "last_gyr": None if self._last_gyr is None else self._last_gyr.tolist(),
+            "last_acc": None if self._last_acc is None else self._last_acc.tolist(),
+            "disturbed_since": self._disturbed_since,
+            "restarts": self.restarts,
+        }
+
+    def restore(self, state: dict[str, Any]) -> None:
+        """Go on as the track whose state this is would have."""
+        self.counter = SequenceCounter(*state["counter"])
+        self.last_ns, self.still_since_ns = state["last_ns"], state["still_since_ns"]
+        self.batch_ns, self.restarts = state["batch_ns"], state["restarts"]
+        self._filter.restore(state["filter"])
+        self._blocks = deque(
+            _Block(times, np.array(quats).reshape(-1, 4), first, received, gap, disturbed)
+            for times, quats, first, received, gap, disturbed in state["blocks"]
+        )
+        self._last_gyr = None if state["last_gyr"] is None else np.array(state["last_gyr"])
+        self._last_acc = None if state["last_acc"] is None else np.array(state["last_acc"])
+        self._disturbed_since = state["disturbed_since"]
