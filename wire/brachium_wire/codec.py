@@ -60,7 +60,11 @@ T = TypeVar("T", bound=Message)
 
 
 def encode(message: Message) -> bytes:
-    """Return the message as MessagePack: what msgpack.packb makes of the same map, in a fifth of the time."""
+    """Return the message as MessagePack, in a fifth of the time of msgpack.packb.
+
+    The bytes are those of msgpack.packb on the same map; only a kind of more than 15 fields (status) of which
+    few are set, may have the 3-byte header of a map where 1 byte would do.
+    """
     return _encoder.encode(message)
 
 
@@ -69,7 +73,7 @@ def unpack(payload: bytes, max_bytes: int) -> dict[str, object]:
     if len(payload) > max_bytes:
         raise WireError(Drop.OVERSIZE, f"message of {len(payload)} bytes; at most {max_bytes} are taken here")
     try:
-        value = msgpack.unpackb(payload, raw=False, strict_map_key=True, **_LIMITS)
+        value = msgpack.unpackb(payload, raw=False, strict_map_key=True, ext_hook=_no_extension, **_LIMITS)
     except (
         Exception
     ) as error:  # msgpack raises ValueError, its own classes, UnicodeDecodeError, RecursionError
@@ -108,6 +112,10 @@ def decode_topic(payload: bytes, topic: str) -> Message:
     """Return the message that the topic table promises for `topic`, or raise WireError."""
     row = TOPICS[topic]
     return decode(payload, row.message, row.max_bytes)
+
+
+def _no_extension(code: int, _data: bytes) -> object:
+    raise ValueError(f"extension type {code} is not used here")
 
 
 def _sound(value: object, tag: str, depth: int) -> None:
