@@ -1,8 +1,9 @@
-"""A moving arm as skeletons, and a router to send them through."""
+"""A moving arm as skeletons, a router to send them through, and the view that shows them."""
 
 import socket
 import threading
 from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
 
 import numpy as np
 import pytest
@@ -10,9 +11,12 @@ import pytest
 from brachium_body import rotation
 from brachium_router.config import RouterSettings, endpoint
 from brachium_router.service import run as run_router
+from brachium_viewer.live import ViewSettings
+from brachium_viewer.live import run as run_view
 from brachium_wire.messages import SegmentPose, Skeleton
 
 LENGTHS = (0.31, 0.26, 0.18)
+START_S = 40.0
 
 
 @pytest.fixture
@@ -83,3 +87,48 @@ def router_endpoint() -> Iterator[str]:
     stop.set()
     thread.join(2.0)
     assert not thread.is_alive()
+
+
+class Running:
+    """A view in a thread: its address, and its end."""
+
+    def __init__(self, endpoint: str, **settings: object) -> None:
+        self.stop = threading.Event()
+        self.address: str | None = None
+        self.error: Exception | None = None
+        self.settings = ViewSettings(
+            endpoint=endpoint, web=True, web_port=0, grpc_port=0, on_address=self._ready, **settings
+        )
+        self._open = threading.Event()
+        self.thread = threading.Thread(target=self._run)
+        self.thread.start()
+        assert self._open.wait(START_S)
+
+    def _ready(self, address: str) -> None:
+        self.address = address
+        self._open.set()
+
+    def _run(self) -> None:
+        try:
+            run_view(self.settings, self.stop)
+        except Exception as error:
+            self.error = error
+        finally:
+            self._open.set()
+
+
+@contextmanager
+def _view(endpoint: str, **settings: object) -> Iterator[Running]:
+    running = Running(endpoint, **settings)
+    try:
+        yield running
+    finally:
+        running.stop.set()
+        running.thread.join(2.0)
+        assert not running.thread.is_alive(), "the view must end within 2 s"
+
+
+@pytest.fixture
+def open_view() -> Callable[..., AbstractContextManager[Running]]:
+    """The view of a router's room as a context manager; it must end within 2 s."""
+    return _view

@@ -6,8 +6,7 @@ import signal
 import socket
 import threading
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -24,45 +23,6 @@ from brachium_wire.messages import Health  # noqa: E402
 
 pytestmark = pytest.mark.network
 DEADLINE_S = 40.0
-
-
-class Running:
-    """A view in a thread: its address, and its end."""
-
-    def __init__(self, endpoint: str, **settings: object) -> None:
-        self.stop = threading.Event()
-        self.address: str | None = None
-        self.error: Exception | None = None
-        self.settings = ViewSettings(
-            endpoint=endpoint, web=True, web_port=0, grpc_port=0, on_address=self._ready, **settings
-        )
-        self._open = threading.Event()
-        self.thread = threading.Thread(target=self._run)
-        self.thread.start()
-        assert self._open.wait(DEADLINE_S)
-
-    def _ready(self, address: str) -> None:
-        self.address = address
-        self._open.set()
-
-    def _run(self) -> None:
-        try:
-            run(self.settings, self.stop)
-        except Exception as error:
-            self.error = error
-        finally:
-            self._open.set()
-
-
-@contextmanager
-def view(endpoint: str, **settings: object) -> Iterator[Running]:
-    running = Running(endpoint, **settings)
-    try:
-        yield running
-    finally:
-        running.stop.set()
-        running.thread.join(2.0)
-        assert not running.thread.is_alive(), "the view must end within 2 s"
 
 
 def viewer_pid() -> int:
@@ -85,8 +45,8 @@ def watch(inbox: Inbox, send: Callable[[int], None], until: Callable[[Health], b
     raise AssertionError(f"the view's health never came to {until}")
 
 
-def test_a_view_takes_skeletons_tells_its_address_and_listens_on_loopback_only(router_endpoint, arm_at):
-    with Bus.open(router_endpoint) as bus, view(router_endpoint) as running:
+def test_a_view_takes_skeletons_tells_its_address_and_listens_on_loopback(router_endpoint, arm_at, open_view):
+    with Bus.open(router_endpoint) as bus, open_view(router_endpoint) as running:
         inbox = bus.subscribe(keys.services("lab", "view/*"))
 
         def send(n: int) -> None:
@@ -114,8 +74,8 @@ def test_a_view_takes_skeletons_tells_its_address_and_listens_on_loopback_only(r
     assert running.error is None
 
 
-def test_a_frozen_viewer_holds_nobody_up_and_fills_no_memory(router_endpoint, arm_at):
-    with Bus.open(router_endpoint) as bus, view(router_endpoint) as running:
+def test_a_frozen_viewer_holds_nobody_up_and_fills_no_memory(router_endpoint, arm_at, open_view):
+    with Bus.open(router_endpoint) as bus, open_view(router_endpoint) as running:
         inbox = bus.subscribe(keys.services("lab", "view/*"))
 
         def send(n: int) -> None:
@@ -132,8 +92,8 @@ def test_a_frozen_viewer_holds_nobody_up_and_fills_no_memory(router_endpoint, ar
     assert running.error is None  # and it ended within 2 s, its viewer still frozen
 
 
-def test_the_end_of_the_viewer_is_the_end_of_the_view_and_says_why(router_endpoint):
-    with view(router_endpoint) as running:
+def test_the_end_of_the_viewer_is_the_end_of_the_view_and_says_why(router_endpoint, open_view):
+    with open_view(router_endpoint) as running:
         os.kill(viewer_pid(), signal.SIGKILL)
         running.thread.join(5.0)
         assert not running.thread.is_alive()
