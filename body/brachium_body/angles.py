@@ -76,7 +76,7 @@ def joint_angles(
     second = np.arctan2(m.m32, np.hypot(m.m12, m.m22))
     third = np.arctan2(-m.m31, m.m33)
     angles[..., 0], angles[..., 1], angles[..., 2] = first[0], second[0], third[0]
-    angles[..., 7:10], angles[..., 14:17] = _shoulder(q[0])
+    _put_shoulder(angles, q[0])
     angles[..., 3] = angles[..., 10] = angles[..., 17] = first[1]
     angles[..., 18] = second[1]
     angles[..., 4] = angles[..., 11] = third[1]
@@ -90,28 +90,24 @@ def joint_angles(
     return angles
 
 
-def _shoulder(q: Array) -> tuple[Array, Array]:
-    """Return the clinical triple and ISB's, each (..., 3), of thorax_from_upper_arm (..., 4) of right arms.
+def _put_shoulder(angles: Array, q: Array) -> None:
+    """Put the clinical triple and ISB's into angles, for thorax_from_upper_arm (..., 4) of right arms.
 
     q = swing * twist, the twist about the humerus (Y), the swing about an axis across it. With ISB's Y-X-Y
     angles p, e, a the swing is the turn by e whose axis is (-cos p, 0, sin p) and the twist is p + a, so the
     clinical triple needs no p and is smooth where p is undefined.
     """
-    w, x, y, z = np.moveaxis(q, -1, 0)
+    w, x, y, z = q[..., 0], q[..., 1], q[..., 2], q[..., 3]
     half_twist = np.arctan2(y, w)
     cos_twist, sin_twist = np.cos(half_twist), np.sin(half_twist)
-    swing_x = x * cos_twist + z * sin_twist
-    swing_z = z * cos_twist - x * sin_twist
     sine = np.hypot(x, z)
     elevation = 2.0 * np.arctan2(sine, np.hypot(w, y))
     scale = np.where(sine > 1e-12, elevation / np.maximum(sine, 1e-300), 2.0)
-    flexion, abduction = scale * swing_z, -scale * swing_x
-    rotation = wrap(2.0 * half_twist)
-    plane = np.arctan2(
-        flexion + 0.0, abduction + 0.0
-    )  # + 0.0 turns -0.0 round: hanging exactly, the plane is 0
-    clinical = np.stack([flexion, abduction, rotation], axis=-1)
-    return clinical, np.stack([plane, elevation, wrap(rotation - plane)], axis=-1)
+    flexion = scale * (z * cos_twist - x * sin_twist)
+    abduction = -scale * (x * cos_twist + z * sin_twist)
+    plane = np.arctan2(flexion + 0.0, abduction + 0.0)  # + 0.0 turns -0.0 round: just hanging, the plane is 0
+    angles[..., 7], angles[..., 8], angles[..., 9] = flexion, abduction, wrap(2.0 * half_twist)
+    angles[..., 14], angles[..., 15], angles[..., 16] = plane, elevation, wrap(2.0 * half_twist - plane)
 
 
 def clavicle_angles(shoulder_shift: npt.ArrayLike, chest_to_shoulder: npt.ArrayLike, side: Sides) -> Array:
@@ -123,7 +119,7 @@ def clavicle_angles(shoulder_shift: npt.ArrayLike, chest_to_shoulder: npt.ArrayL
 
 
 def _entries(q: Array) -> _Entries:
-    w, x, y, z = np.moveaxis(q, -1, 0)
+    w, x, y, z = q[..., 0], q[..., 1], q[..., 2], q[..., 3]
     xx, yy, zz = x * x, y * y, z * z
     return _Entries(
         m11=1.0 - 2.0 * (yy + zz),

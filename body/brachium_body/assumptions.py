@@ -14,7 +14,7 @@ import numpy.typing as npt
 from .angles import CLAVICLE, COLUMNS, ELBOW, SHOULDER, TRUNK, WRIST
 from .kinematics import TRUNK_FROM_NEUTRAL, SegmentOrientations, joint_rotations
 from .rotation import Array, multiply
-from .sides import Sides, is_left
+from .sides import Sides
 
 Codes = npt.NDArray[np.uint8]
 Mask = npt.NDArray[np.bool_]
@@ -74,23 +74,22 @@ def complete(
 ) -> SegmentOrientations:
     """Return the orientations with those that are not known filled in as far as the set of sensors allows.
 
-    Unknown ones come in as NaN. Upper arm: hanging in neutral. Forearm: at the stated elbow angles, where
-    one of its neighbours alone is known. Hand: in line with the forearm, or at the stated wrist angles under
-    an upper arm alone. What it does not give stays NaN: a forearm between a known upper arm and a known hand.
+    Unknown ones (..., 4) come in as NaN; `side` and `stated` are one for all rows or one each. Upper arm:
+    hanging in neutral. Forearm: at the stated elbow angles, where one of its neighbours alone is known.
+    Hand: in line with the forearm, or at the stated wrist angles under an upper arm alone. What it does not
+    give stays NaN: a forearm between a known upper arm and a known hand.
     """
     known = known_set(segments)
-    rows = np.broadcast_shapes(known.shape, is_left(side).shape)
-    known = np.broadcast_to(known, rows)
-    joints = joint_rotations(_stated_theta(known, stated), side)
-
-    upper_arm = np.broadcast_to(segments.trunk_from_upper_arm, (*rows, 4))
-    upper_arm = np.where(_among(known, (2, 4, 6)), TRUNK_FROM_NEUTRAL, upper_arm)
-    forearm = np.broadcast_to(segments.trunk_from_forearm, (*rows, 4))
-    forearm = np.where(_among(known, (1, 4)), multiply(upper_arm, joints.upper_arm_from_forearm), forearm)
-    hand = np.broadcast_to(segments.trunk_from_hand, (*rows, 4))
-    hand = np.where(_among(known, (1,)), multiply(forearm, joints.forearm_from_hand), hand)
-    hand = np.where(_among(known, (2, 3)), forearm, hand)
-    return SegmentOrientations(upper_arm, forearm, hand)
+    hanging, posed, straight = (_among(known, sets) for sets in ((2, 4, 6), (1, 4), (2, 3)))
+    if not (hanging | posed | straight).any():
+        return segments
+    upper_arm = np.where(hanging, TRUNK_FROM_NEUTRAL, segments.trunk_from_upper_arm)
+    forearm, hand = segments.trunk_from_forearm, segments.trunk_from_hand
+    if posed.any():
+        joints = joint_rotations(_stated_theta(known, stated), side)
+        forearm = np.where(posed, multiply(upper_arm, joints.upper_arm_from_forearm), forearm)
+        hand = np.where(_among(known, (1,)), multiply(forearm, joints.forearm_from_hand), hand)
+    return SegmentOrientations(upper_arm, forearm, np.where(straight, forearm, hand))
 
 
 def provenance(

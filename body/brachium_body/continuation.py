@@ -137,9 +137,12 @@ def _follow_theta(raw: Array, last: Array, thorax_from_upper_arm: Array) -> Arra
     other_cost = np.where(first, _off_range(other_near), np.abs(other_near - near_to).sum(axis=1))
     change: Mask = other_cost < one_cost
     result = np.where(change[:, None], other_near, one_near)
-    singular: Mask = ~first & (np.abs(np.cos(raw[:, 1])) < _NEAR)
+    singular: Mask = np.abs(np.cos(raw[:, 1])) < _NEAR
     if singular.any():
-        result[singular] = _hold(result[singular], last[singular], thorax_from_upper_arm[singular])
+        before = np.where(
+            first[:, None], 0.0, last
+        )  # an arm first seen there: theta1 is 0, the turn is theta3's
+        result[singular] = _hold(result[singular], before[singular], thorax_from_upper_arm[singular])
     lost: Mask = ~first & ~singular & (_off_range(result) > _BOX_TOLERANCE)
     if lost.any():
         result[lost] = _back_in_range(result[lost])

@@ -70,6 +70,39 @@ def test_the_first_sample_takes_the_branch_that_a_shoulder_can_have(side, start)
     assert np.allclose(np.degrees(follow(q, raw, side)[0, :3]), start)
 
 
+@pytest.mark.parametrize("side", SIDES)
+def test_an_arm_first_seen_in_the_singularity_has_no_theta1(side):
+    q, raw = movement(np.array([(30.0, -89.999, 50.0)]), side)
+    assert np.allclose(np.degrees(follow(q, raw, side)[0, :3]), [0.0, -90.0, 20.0], atol=0.01)
+
+
+def test_continued_angles_are_the_same_rotations():
+    rng = np.random.default_rng(40)
+    steps = rotation.from_rotation_vector(rng.normal(0.0, np.radians(2.0), (3, 3000, 3)))
+    q = np.empty_like(steps)
+    q[:, 0] = rotation.about(0, np.radians(-85.0))
+    for i in range(1, q.shape[1]):
+        q[:, i] = rotation.multiply(q[:, i - 1], steps[:, i])
+    raw = angles.joint_angles(*q, "right")
+    found = follow(q[0], raw, "right")
+    turning = [i for i in range(3, 20) if angles.COLUMNS[i] not in ("shoulder_flexion", "shoulder_abduction")]
+    assert np.abs(rotation.wrap(found[:, turning] - raw[:, turning])).max() < 1e-9
+
+    def swing(values):
+        return rotation.from_rotation_vector(
+            np.pad(values[:, [8, 7]] * [-1.0, 1.0], ((0, 0), (0, 1)))[:, [0, 2, 1]]
+        )
+
+    assert np.abs(np.abs(np.sum(swing(found) * swing(raw), axis=1)) - 1.0).max() < 1e-9
+    made = kinematics.joint_rotations(np.pad(found[:, :3], ((0, 0), (0, 4))), "right").thorax_from_upper_arm
+    cosine = np.abs(np.cos(raw[:, 1]))
+    near = cosine < np.sin(np.radians(10.0))
+    assert 50 < near.sum() < 1500
+    error = rotation.angle_between(made, q[0])
+    assert error[~near].max() < 1e-7
+    assert (error[near] <= np.pi * cosine[near] + 1e-7).all()
+
+
 def test_a_shoulder_lowered_another_way_than_raised_hangs_at_zero_again():
     # Up in abduction, round to the front, down in flexion: the triple of the way up would end at 180.
 
