@@ -58,7 +58,7 @@ def run_command(name: str, summary: str, module: Any, words: list[str]) -> int:
         prog=f"brachium {name}",
         description=f"{summary[0].upper()}{summary[1:]}.",
         epilog=_epilog(command.__doc__ or ""),
-        formatter_class=argparse.RawDescriptionHelpFormatter,
+        formatter_class=_Help,
     )
     command.configure(parser)
     parser.add_argument("-v", "--verbose", action="store_true", help="log more, with the origin of an error")
@@ -84,15 +84,13 @@ def run_command(name: str, summary: str, module: Any, words: list[str]) -> int:
 
 def add_room(parser: argparse.ArgumentParser) -> None:
     """Add --room."""
-    parser.add_argument("--room", default=DEFAULT_ROOM, help="the room's name in keys (default: %(default)s)")
+    parser.add_argument("--room", default=DEFAULT_ROOM, help="the room's name in keys")
 
 
 def add_network(parser: argparse.ArgumentParser) -> None:
     """Add the options of every command that joins a network."""
     add_room(parser)
-    parser.add_argument(
-        "--endpoint", default="tcp/127.0.0.1:7447", help="where the router listens (default: %(default)s)"
-    )
+    parser.add_argument("--endpoint", default="tcp/127.0.0.1:7447", help="where the router listens")
 
 
 def add_json(parser: argparse.ArgumentParser) -> None:
@@ -140,6 +138,14 @@ def serve(run: Callable[[threading.Event], object]) -> int:
         if not stop.is_set():
             raise
     return 0
+
+
+class _Help(argparse.RawDescriptionHelpFormatter):
+    """Shows each option's default, where there is one."""
+
+    def _get_help_string(self, action: argparse.Action) -> str | None:
+        shown = action.help and action.default not in (None, False, argparse.SUPPRESS)
+        return f"{action.help} (default: %(default)s)" if shown else action.help
 
 
 def _complaint(error: Exception) -> tuple[int, str | None]:

@@ -11,12 +11,10 @@ from brachium.shell import add_network, serve
 def configure(parser: argparse.ArgumentParser) -> None:
     """Add fusion's options."""
     add_network(parser)
-    parser.add_argument("--id", default="fusion", help="this service's name (default: %(default)s)")
+    parser.add_argument("--id", default="fusion", help="this service's name")
     parser.add_argument("--filter", default="auto", help="auto, vqf, complementary or complementary-printed")
     parser.add_argument("--no-mag", action="store_true", help="leave magnetometers aside")
-    parser.add_argument(
-        "--rate", type=float, default=50.0, metavar="HZ", help="skeletons a second (default: 50)"
-    )
+    parser.add_argument("--rate", type=float, default=50.0, metavar="HZ", help="skeletons a second")
     parser.add_argument("--no-auto-pose", action="store_true", help="calibrate only when asked to")
 
 

@@ -17,11 +17,9 @@ if TYPE_CHECKING:
 def configure(parser: argparse.ArgumentParser) -> None:
     """Add the gateway's options."""
     add_network(parser)
-    parser.add_argument(
-        "--id", default="gateway", help="names the service and its clock (default: %(default)s)"
-    )
-    parser.add_argument("--bind", default="127.0.0.1", help="address of one interface (default: %(default)s)")
-    parser.add_argument("--port", type=int, default=8765, help="0 takes any free one (default: %(default)s)")
+    parser.add_argument("--id", default="gateway", help="names the service and its clock")
+    parser.add_argument("--bind", default="127.0.0.1", help="address of one interface")
+    parser.add_argument("--port", type=int, default=8765, help="0 takes any free one")
     parser.add_argument("--site", type=Path, metavar="FILE.toml", help="the nodes of this site file may join")
     parser.add_argument(
         "--join-token-sha256", metavar="HEX", help="nodes with this token may knock and wait to be assigned"

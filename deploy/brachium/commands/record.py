@@ -15,10 +15,10 @@ def configure(parser: argparse.ArgumentParser) -> None:
     add_json(parser)
     parser.add_argument("--subject", help="only this subject and the services (default: everybody)")
     parser.add_argument(
-        "--out", type=Path, default=Path("recordings"), metavar="DIR", help="default: %(default)s"
+        "--out", type=Path, default=Path("recordings"), metavar="DIR", help="where the file goes"
     )
     parser.add_argument("--seconds", type=float, help="how long (default: until Ctrl-C)")
-    parser.add_argument("--id", default="main", help="this recorder's name (default: %(default)s)")
+    parser.add_argument("--id", default="main", help="this recorder's name")
 
 
 def run(args: argparse.Namespace) -> int:

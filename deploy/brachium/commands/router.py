@@ -11,11 +11,9 @@ from brachium.shell import add_room, serve
 def configure(parser: argparse.ArgumentParser) -> None:
     """Add the router's options."""
     add_room(parser)
-    parser.add_argument("--bind", default="127.0.0.1", help="address of one interface (default: %(default)s)")
-    parser.add_argument("--port", type=int, default=7447, help="default: %(default)s")
-    parser.add_argument(
-        "--max-sessions", type=int, default=256, help="programs at once (default: %(default)s)"
-    )
+    parser.add_argument("--bind", default="127.0.0.1", help="address of one interface")
+    parser.add_argument("--port", type=int, default=7447, help="to listen on")
+    parser.add_argument("--max-sessions", type=int, default=256, help="programs at once")
     parser.add_argument("--users", metavar="FILE", help="file of lines user:password; only these may attach")
     parser.add_argument(
         "--print-config",

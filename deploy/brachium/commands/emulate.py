@@ -1,0 +1,132 @@
+"""Emulate a wearer: its sensors, through the gateway or straight to the bus, and the truth beside them.
+
+brachium emulate --direct --exercise drinking --level typical --seconds 60
+  brachium emulate --print-nodes --token-file token.txt >> site.toml
+"""
+
+import argparse
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from brachium.shell import Usage, add_json, add_network, print_json, stop_on_signals
+
+if TYPE_CHECKING:
+    from brachium_nodes.emulate import EmulateSettings
+
+TOKEN_VARIABLE = "BRACHIUM_TOKEN"
+
+
+def configure(parser: argparse.ArgumentParser) -> None:
+    """Add the wearer's options."""
+    add_network(parser)
+    add_json(parser)
+    parser.add_argument(
+        "--gateway", default="ws://127.0.0.1:8765/node", metavar="URL", help="where it listens"
+    )
+    parser.add_argument(
+        "--token-file", type=Path, metavar="FILE", help=f"the nodes' token (or ${TOKEN_VARIABLE})"
+    )
+    parser.add_argument("--direct", action="store_true", help="publish without a gateway")
+    parser.add_argument("--speed", type=float, default=1.0, help="times real time; only with --direct")
+    parser.add_argument("--seconds", type=float, help="how long (default: until Ctrl-C)")
+    parser.add_argument("--subject", default="p01", help="the subject's name")
+    parser.add_argument("--wearers", type=int, default=1, help="more than one: p001, p002, ...")
+    parser.add_argument("--print-nodes", action="store_true", help="print the nodes for a site file, and end")
+    add_wearer(parser)
+    add_faults(parser)
+
+
+def add_wearer(parser: argparse.ArgumentParser) -> None:
+    """Add who moves, and with which sensors."""
+    parser.add_argument("--exercise", default="elbow-flexion", help="what is done")
+    parser.add_argument("--arms", default="right", help="right, left or both")
+    parser.add_argument("--level", default="typical", help="sensor errors: ideal or typical")
+    parser.add_argument("--seed", type=int, default=1, help="of everything random")
+    parser.add_argument("--rate", type=float, default=100.0, metavar="HZ", help="of the sensors")
+    parser.add_argument("--batch", type=int, default=5, help="samples in a packet")
+    parser.add_argument("--segments", metavar="A,B", help="which carry a sensor (default: the arm's three)")
+
+
+def add_faults(
+    parser: argparse.ArgumentParser, *, loss: float = 0.0, swap: float = 0.0, wifi: str = "none"
+) -> None:
+    """Add what goes wrong on the way."""
+    parser.add_argument("--loss", type=float, default=0.0, help="probability a packet")
+    parser.add_argument("--swap", type=float, default=0.0, help="probability of a late packet")
+    parser.add_argument("--duplicate", type=float, default=0.0, help="probability a packet")
+    parser.add_argument("--wifi", default="none", help="delays: none, good or busy")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Emulate, then tell what was sent."""
+    from brachium_nodes import emulate
+
+    chosen = settings(args, _token(args))
+    if args.print_nodes:
+        print("\n".join(node_table(chosen)))
+        return 0
+    report = emulate.run(chosen, stop_on_signals())
+    if args.json:
+        print_json(report)
+        return 0
+    for subject, streams in report.streams.items():
+        for segment, count in streams.items():
+            print(
+                f"{subject} {segment}: {count.sent} samples sent, {count.lost} lost, {count.swapped} out of order"
+            )
+    return 0
+
+
+def settings(args: argparse.Namespace, token: str) -> "EmulateSettings":
+    """Return what the options ask for; raises ValueError for what cannot be emulated."""
+    from brachium_nodes.emulate import EmulateSettings
+    from brachium_nodes.link import FaultSettings
+    from brachium_nodes.wearer import WearerSettings
+
+    return EmulateSettings(
+        endpoint=args.endpoint,
+        room=args.room,
+        gateway=args.gateway,
+        token=token,
+        direct=args.direct,
+        speed=args.speed,
+        seconds=args.seconds,
+        subject=args.subject,
+        wearers=args.wearers,
+        wearer=WearerSettings(
+            exercise=args.exercise,
+            arms=args.arms,
+            level=args.level,
+            seed=args.seed,
+            rate_hz=args.rate,
+            batch=args.batch,
+            segments=tuple(args.segments.split(",")) if args.segments else (),
+        ),
+        faults=FaultSettings(loss=args.loss, swap=args.swap, duplicate=args.duplicate, wifi=args.wifi),
+    )
+
+
+def node_table(chosen: "EmulateSettings") -> list[str]:
+    """Return the lines of a site file that let these wearers' nodes in."""
+    from brachium_nodes.emulate import node_entries
+
+    lines = []
+    for entry in node_entries(chosen):
+        lines += ["[[node]]", f'id = "{entry.id}"', f'token_sha256 = "{entry.token_sha256}"']
+        lines += [f'subject = "{entry.subject}"', f'segment = "{entry.segment}"']
+        if entry.mounting is not None:
+            lines.append(f"mounting = {[float(part) for part in entry.mounting]}")
+        lines.append("")
+    return lines
+
+
+def _token(args: argparse.Namespace) -> str:
+    if args.token_file is not None:
+        return args.token_file.read_text("utf-8").strip()
+    token = os.environ.get(TOKEN_VARIABLE, "")
+    if not token and not args.direct:
+        raise Usage(
+            f"nodes need a token to join a gateway: give --token-file or ${TOKEN_VARIABLE}, or --direct"
+        )
+    return token
