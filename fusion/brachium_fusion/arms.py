@@ -1,6 +1,7 @@
 """Kinematics of many arms at once: orientations of sensors at solved instants in, skeletons out. Pure.
 
-A row is one arm at one instant. Everything but the memory of each arm's last angles is computed for all rows in one
+A row is one arm at one instant. Everything but the memory of each arm's last angles is computed for all
+rows in one
 go; the memory takes each arm's rows one after another.
 """
 
@@ -23,6 +24,7 @@ from brachium_body.assumptions import (
     withhold,
 )
 from brachium_body.continuation import AngleTracker
+from brachium_body.denavit_hartenberg import printed_angles
 from brachium_body.kinematics import JOINTS, TRUNK_FROM_THORAX, SegmentOrientations, between, positions
 from brachium_body.lengths import ArmLengths, from_measured
 from brachium_body.segments import SIDES, Side, arm_segments
@@ -37,7 +39,8 @@ DEFAULT_HEIGHT_M = 1.75
 """Used for lengths while nobody said how tall the subject is."""
 HEADING_SD_DEG = 2.0
 HEADING_DRIFT_DEG_S = 0.02
-"""Heading without a magnetometer: uncertain by 2 deg after a pose, then by what a bias estimated at rests leaves of a
+"""Heading without a magnetometer: uncertain by 2 deg after a pose, then by what a bias estimated at rests
+leaves of a
 cheap gyroscope (0.02 deg/s). A working assumption, stated in docs/conventions.md."""
 WITHHOLD_DEG = 15.0
 """Angles that rest on heading are left out when it is less certain than this."""
@@ -122,7 +125,7 @@ def rows_of(subject_id: str, subject: Subject, instant: Instant) -> list[Row]:
 class _Frame(NamedTuple):
     """What stays the same for an arm between two calibrations."""
 
-    key: tuple[Any, ...]
+    revision: int
     turn: Floats
     sensor_from_segment: Floats
     trunk_from_world: Floats
@@ -134,11 +137,9 @@ class _Frame(NamedTuple):
 
 def _frame(subject: Subject, instant: Instant, side: Side) -> _Frame:
     """Return the arm's frame, made anew only when something it rests on was replaced."""
-    key = (instant.alignment, instant.session, len(subject.tracks))
     known = subject.frames.get(side)
-    if known is not None and all(a is b or a == b for a, b in zip(known.key[1:], key[1:], strict=True)):
-        if known.key[0] is key[0]:
-            return known
+    if isinstance(known, _Frame) and known.revision == subject.revision:
+        return known
     slots = ("sternum", *arm_segments(side))
     alignment = instant.alignment or Alignment(world_from_trunk=_facing(instant.session, subject))
     turn = np.tile(rotation.IDENTITY, (_SLOTS, 1))
@@ -153,7 +154,7 @@ def _frame(subject: Subject, instant: Instant, side: Side) -> _Frame:
     tracks = [subject.tracks[s] for s in slots if s in subject.tracks]
     origins = {track.info.origin for track in tracks}
     frame = _Frame(
-        key=key,
+        revision=subject.revision,
         turn=turn,
         sensor_from_segment=sensor_from_segment,
         trunk_from_world=rotation.inverse(alignment.world_from_trunk),
@@ -190,7 +191,6 @@ class Arms:
         self._printed = settings.filter == "complementary-printed"
         self._tracker = AngleTracker()
         self._index: dict[tuple[str, Side], int] = {}
-        self._frames: dict[int, Floats] = {}
 
     def solve(self, rows: Sequence[Row]) -> list[Skeleton]:
         """Return one skeleton a row, in the order of the rows."""
@@ -223,6 +223,8 @@ class Arms:
         raw = joint_angles(*joints, left, calibration_from_thorax=from_pose)
         codes = provenance(known, thorax_known)
         angles = withhold(self._follow(rows, raw, joints.thorax_from_upper_arm, left), codes.angles)
+        if self._printed:
+            angles[:, :7] = withhold(printed_angles(joints, left), codes.angles[:, :7])
         drifting = np.array([row.withhold_heading for row in rows])
         if drifting.any():
             angles[np.ix_(drifting, _ON_HEADING)] = np.nan
@@ -313,7 +315,7 @@ def _stated_rows(rows: Sequence[Row]) -> StatedAngles:
     )
 
 
-# -- messages ----------------------------------------------------------------------------------------------------
+# -- messages --------------------------------------------------------------------------------------------
 
 _NEEDS: dict[str, tuple[int, ...]] = {
     **dict.fromkeys(SHOULDER, (0, 1)),

@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from brachium_body import rotation
-from brachium_body.segments import part_of
+from brachium_body.segments import Segment, part_of
 from brachium_fusion.pipeline import Pipeline
 from brachium_fusion.pose import Alignment
 from brachium_fusion.subject import Settings, Subject
@@ -58,8 +58,10 @@ def session(capture: Capture) -> Session:
 
 
 def output_times(capture: Capture, rate_hz: float | None) -> Floats:
-    """Return the instants (n,) s to solve: a grid of `rate_hz`, or the sample times of the fastest segment, the one
-    nearest to the trunk among equals."""
+    """Return the instants (n,) s to solve: a grid of `rate_hz`, or the samples of the fastest segment.
+
+    Among equals it is the one nearest to the trunk.
+    """
     if rate_hz is not None:
         first = min(float(data.t[0]) for data in capture.segments.values())
         last = max(float(data.t[-1]) for data in capture.segments.values())
@@ -84,9 +86,10 @@ def solve(capture: Capture, settings: Settings, times_s: Floats) -> tuple[Pipeli
 
 
 def batches(capture: Capture, until_s: float | None = None) -> Iterator[tuple[str, Samples]]:
-    """Yield all segments' samples in small batches, in order of their last sample's time. A gap in time never lies
+    """Yield all segments' samples in small batches, in order of their last sample's time. A gap in time
+    never lies
     within a batch."""
-    pieces: list[tuple[float, str, int, int]] = []
+    pieces: list[tuple[float, Segment, int, int]] = []
     for segment, data in capture.segments.items():
         breaks = np.flatnonzero(np.diff(data.t) > 2.5 / data.rate_hz) + 1
         edges = np.unique(np.concatenate([np.arange(0, len(data.t), BATCH), breaks, [len(data.t)]]))
@@ -95,7 +98,7 @@ def batches(capture: Capture, until_s: float | None = None) -> Iterator[tuple[st
     for last, segment, start, end in sorted(pieces):
         if until_s is not None and last > until_s + 1.0:
             return
-        yield segment, _samples(capture.segments[segment], start, end)  # type: ignore[index]
+        yield segment, _samples(capture.segments[segment], start, end)
 
 
 def _samples(data: CaptureSegment, start: int, end: int) -> Samples:
@@ -154,8 +157,8 @@ def _alignment(capture: Capture, settings: Settings) -> Alignment | None:
     _begin(subject, capture, nanoseconds(times[times <= end]).tolist())
     pose: dict[str, list[Floats]] = {}
     moving: dict[str, _Held] = {}
-    for segment, samples in batches(capture, end):
-        subject.feed(segment, samples)
+    for fed, samples in batches(capture, end):
+        subject.feed(fed, samples)
         for instant in subject.instants():
             at_s = (instant.time_ns - ZERO_NS) * 1e-9
             for name, reading in instant.readings.items():
@@ -184,7 +187,7 @@ def _alignment(capture: Capture, settings: Settings) -> Alignment | None:
 def flexion_axis(world_from_sensor: Floats, time_s: Floats, in_pose: Floats) -> Floats:
     """Return the axis (3,) of elbow flexion in the forearm sensor's world, pointing to the subject's right.
 
-    From orientations (n, 4) during repeated flexion, time_s (n,), and the orientation (4,) in the pose, arm hanging:
+    From orientations (n, 4) during repeated flexion, time_s (n,), and the one (4,) in the pose, arm hanging:
     the axis about which it turned most; its sign is the one with which the forearm rises.
     """
     step = rotation.multiply(world_from_sensor[1:], rotation.inverse(world_from_sensor[:-1]))

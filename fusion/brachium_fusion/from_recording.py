@@ -1,6 +1,8 @@
-"""A recording through the pipeline: its snapshot, the changes that fusion applied, and every batch as it came. Pure.
+"""A recording through the pipeline: its snapshot, the changes that fusion applied, and every batch as it
+came. Pure.
 
-With the settings of the recording the skeletons are those that were live; with others they are what these settings
+With the settings of the recording the skeletons are those that were live; with others they are what these
+settings
 would have given.
 """
 
@@ -15,7 +17,8 @@ from brachium_wire.messages import Event, Skeleton, Snapshot
 from brachium_wire.recording import Recorded
 
 DRAIN = 512
-"""Messages between two rounds of kinematics: large rounds are cheap, and how large plays no part in the result."""
+"""Messages between two rounds of kinematics: large rounds are cheap, and how large plays no part in the
+result."""
 
 
 @dataclass(slots=True)

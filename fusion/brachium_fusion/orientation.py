@@ -66,14 +66,14 @@ class VqfFilter:
     ) -> Floats:
         """See OrientationFilter.update."""
         if mag is None or not self._magnetometer:
-            quats: Floats = self._filter.updateBatch(gyr, acc)[self._output]
-            return quats
+            tilted: Floats = self._filter.updateBatch(gyr, acc)[self._output]
+            return tilted
         if mag_index is None:
             out = self._filter.updateBatch(gyr, acc, mag)
             # Before a reference was learnt (5 s) everything counts as disturbed; that is no finding.
             self.disturbed = bool(out["magDistDetected"][-1]) and self._filter.getMagRefNorm() > 0.0
-            quats = out[self._output]
-            return quats
+            fused: Floats = out[self._output]
+            return fused
         read = self._filter.getQuat9D if self._output == "quat9D" else self._filter.getQuat6D
         rows = dict(zip(mag_index, mag, strict=True))
         quats = np.empty((len(gyr), 4))
@@ -102,16 +102,18 @@ def _plain(value: Any) -> Any:
 
 
 TIME_CONSTANT_S = 0.98
-"""Tilt and heading follow accelerometer and magnetometer with this: k = 0.98 at the paper's 50 Hz. The paper says
+"""Tilt and heading follow accelerometer and magnetometer with this: k = 0.98 at the paper's 50 Hz. It says
 only that k is close to 1 (erratum T19); a time constant keeps the behaviour at other rates."""
 LEAST_COSINE = 0.02
-"""Floor of cos(theta), where the angle rates are singular: sensor Y vertical, the arm hanging (erratum T15)."""
+"""Floor of cos(theta), where the angle rates are singular: sensor Y vertical, the arm hanging (erratum
+T15)."""
 
 
 class ComplementaryFilter:
-    """The complementary filter of Tsilomitrou et al. 2021, eq 3-9, on Euler angles phi (y), theta (x), psi (z).
+    """The complementary filter of Tsilomitrou et al. 2021, eq 3-9, on angles phi (y), theta (x), psi (z).
 
-    `printed` keeps the equations as they stand. Otherwise they are corrected: the signs of eq 4 (T9), rates taken
+    `printed` keeps the equations as they stand. Otherwise they are corrected: the signs of eq 4 (T9), rates
+    taken
     at the fused angles (T10), the sign and quadrant of eq 5 (T11), eq 6 and 7 with north along +y (T12, T13),
     differences blended within +-180 deg (T14). world_from_sensor = Z(psi) X(theta) Y(phi) in both.
     """

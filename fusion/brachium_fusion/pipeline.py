@@ -1,8 +1,11 @@
 """The heart: messages in, skeletons out. A value: no socket, thread, clock, file or environment.
 
-The live service, playback, the offline solver and the tests run this same object. Feed it every message in order
-of arrival; after each it solves what became solvable, so that how messages were bunched on their way plays no part.
-Orientations are found sample by sample as they come; the kinematics of all arms wait for `skeletons`, which solves
+The live service, playback, the offline solver and the tests run this same object. Feed it every message in
+order
+of arrival; after each it solves what became solvable, so that how messages were bunched on their way plays
+no part.
+Orientations are found sample by sample as they come; the kinematics of all arms wait for `skeletons`, which
+solves
 everything that piled up in one go over arrays of arms.
 """
 
@@ -77,7 +80,8 @@ class Pipeline:
             self._collect(subject_id, subject)
 
     def skeletons(self) -> list[Solved]:
-        """Return the skeletons of every instant solved since the last call, each subject's in order of time."""
+        """Return the skeletons of every instant solved since the last call, each subject's in order of
+        time."""
         rows, self._rows = self._rows, []
         return [
             Solved(row.subject, skeleton) for row, skeleton in zip(rows, self._arms.solve(rows), strict=True)

@@ -84,7 +84,8 @@ class Alignment:
 def pose_orientations(pose: PoseName, angles_deg: dict[str, float]) -> dict[str, Floats]:
     """Return trunk_from_segment of every segment in a pose: by part and side, `forearm_l` and so on.
 
-    `given` takes the model's angles by their clinical names, deg; others are 0. Raises ValueError for a name that is
+    `given` takes the model's angles by their clinical names, deg; others are 0. Raises ValueError for a
+    name that is
     not among them.
     """
     known = {
@@ -118,7 +119,8 @@ def align(
 ) -> Alignment:
     """Return the alignment that makes every sensor's segment stand as `trunk_from_segment` says.
 
-    `facing_deg` is where the pose faces, 0 north, 90 east. `elbow_axis` holds, per segment, the axis of elbow flexion
+    `facing_deg` is where the pose faces, 0 north, 90 east. `elbow_axis` holds, per segment, the axis of
+    elbow flexion
     (3,) seen in that sensor's world, pointing to the subject's right: from a functional movement.
     """
     measured = {s: rotation.mean(sensor.world_from_sensor) for s, sensor in sensors.items()}
@@ -244,20 +246,20 @@ def _warnings(forward: Forward, assumed: set[str], scores: dict[str, float]) -> 
     warnings = []
     if forward == "none":
         warnings.append(
-            "no rule says where forward is: planes of movement are relative to an assumed heading; give facing_deg "
-            "(with magnetometers), a sternum sensor, or the nominal mounting of the upper arm"
+            "no rule says where forward is: planes of movement are relative to an assumed heading; "
+            "give facing_deg (with magnetometers), a sternum sensor, or the nominal mounting of the upper arm"
         )
     if assumed:
         warnings.append(
-            f"heading of {', '.join(sorted(assumed))} is assumed: nothing ties it to the other sensors; give the "
-            "nominal mounting"
+            f"heading of {', '.join(sorted(assumed))} is assumed: "
+            "nothing ties it to the other sensors; give the nominal mounting"
         )
     for name, value in scores.items():
         if name.startswith("from_nominal_deg_") and value > 45.0:
             segment = name.removeprefix("from_nominal_deg_")
+            place = f"{side_of(segment) or ''} {part_of(segment).replace('_', ' ')}".strip()
             warnings.append(
-                f"{segment} sits {value:.0f} deg from its nominal mounting: check that the sensor is on "
-                f"{part_of(segment).replace('_', ' ')}{' ' + str(side_of(segment)) if side_of(segment) else ''}, "
-                "the right way round"
+                f"{segment} sits {value:.0f} deg from its nominal mounting: "
+                f"check that the sensor is on the {place}, the right way round"
             )
     return tuple(warnings)

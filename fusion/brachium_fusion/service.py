@@ -6,6 +6,7 @@ import time
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import Any
 
 import msgspec
 
@@ -115,7 +116,7 @@ class FusionService:
             if calibration.state in ("done", "refused"):
                 self._finish_calibration(subject, calibration)
 
-    # -- commands ------------------------------------------------------------------------------------------------
+    # -- commands ----------------------------------------------------------------------------------------
 
     def _on_command(self, key: str, question: bytes, reply: Reply) -> None:
         """Runs on Zenoh's thread: only keeps the question for the next turn."""
@@ -147,8 +148,9 @@ class FusionService:
         )
         self._apply(subject, "calibrate", wish)
 
-    def _apply(self, subject: str, kind: str, data: dict[str, object]) -> None:
-        """Apply a change from the next tick on, and say so on the bus: a recording repeats it at that tick."""
+    def _apply(self, subject: str, kind: str, data: dict[str, Any]) -> None:
+        """Apply a change from the next tick on, and say so on the bus: a recording repeats it at that
+        tick."""
         change = Change(self._pipeline.subject(subject).next_tick_ns(), kind, data)
         self._pipeline.apply(subject, change)
         event = Event(time_ns=change.from_ns, kind="applied", text=kind, data=data)
@@ -188,7 +190,7 @@ class FusionService:
         heart.beat(now=now)
 
 
-def _wish(command: Command) -> dict[str, object]:
+def _wish(command: Command) -> dict[str, Any]:
     """Return the checked arguments of `calibrate`, or raise ValueError saying what may be asked."""
     arguments = dict(command.arguments)
     pose, seconds = arguments.pop("pose", "n-pose"), arguments.pop("seconds", STILL_S)

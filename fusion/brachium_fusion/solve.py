@@ -1,4 +1,5 @@
-"""`brachium solve`: a recording or a capture folder to a table, through the same pipeline as live. The shell: it
+"""`brachium solve`: a recording or a capture folder to a table, through the same pipeline as live. The
+shell: it
 reads and writes files."""
 
 from collections import Counter

@@ -1,5 +1,6 @@
 """One person's sensors: which instant can be solved, what each segment's orientation is there, and when a
-calibration pose was held. Pure; every decision rests on this subject's own messages, in order of arrival, and on
+calibration pose was held. Pure; every decision rests on this subject's own messages, in order of arrival,
+and on
 changes stamped with the instant from which they hold. So a recording of them gives the same skeletons again.
 """
 
@@ -105,10 +106,12 @@ class Subject:
         """When headings were last set by a pose."""
         self.session = Session()
         self.drops: Counter[str] = Counter()
-        self.frames: dict[Side, Any] = {}
+        self.revision = 0
+        """Counts replacements of sensors, session and alignment."""
+        self.frames: dict[Side, object] = {}
         """Kept by arms.py for each arm between two calibrations; follows from the rest."""
 
-    # -- what comes in -------------------------------------------------------------------------------------------
+    # -- what comes in -----------------------------------------------------------------------------------
 
     def inform(self, segment: str, info: Info) -> None:
         """Take what is known of a segment's sensor. A changed sensor begins a new track."""
@@ -127,6 +130,7 @@ class Subject:
             return
         self.tracks[segment] = SegmentTrack(info, self._settings.filter, self._settings.magnetometer)
         self._held.pop(segment, None)
+        self.revision += 1
         for samples in self._unclaimed.pop(segment, ()):
             self.feed(segment, samples)
 
@@ -168,7 +172,7 @@ class Subject:
         """Nothing more will come: what was waited for is missing."""
         self._ended = True
 
-    # -- what can be solved --------------------------------------------------------------------------------------
+    # -- what can be solved ------------------------------------------------------------------------------
 
     def next_tick_ns(self) -> int:
         """Return the next instant that will be solved, 0 before the first sample."""
@@ -235,13 +239,14 @@ class Subject:
             now + self._period_ns, -(-min(begins) // self._period_ns) * self._period_ns if begins else 0
         )
 
-    # -- changes and poses ---------------------------------------------------------------------------------------
+    # -- changes and poses -------------------------------------------------------------------------------
 
     def _apply_pending(self, now: int) -> None:
         while self._pending and self._pending[0].from_ns <= now:
             change = self._pending.pop(0)
             if change.kind == "session":
                 self.session = msgspec.convert(change.data, Session)
+                self.revision += 1
             else:
                 self._pose = _Pose(from_ns=now, patient=False, **change.data)
                 self._held.clear()
@@ -304,6 +309,7 @@ class Subject:
             elbow_axis=elbow_axis,
         )
         self.reference_ns = now
+        self.revision += 1
         self._say(now, "done", pose=pose)
 
     def _say(self, now: int, state: str, pose: str = "", reason: str = "") -> None:
@@ -322,7 +328,7 @@ class Subject:
             )
         )
 
-    # -- snapshot ------------------------------------------------------------------------------------------------
+    # -- snapshot ----------------------------------------------------------------------------------------
 
     def state(self) -> dict[str, Any]:
         """Return all that changes, as plain values."""
@@ -356,10 +362,12 @@ class Subject:
         self.alignment = None if state["alignment"] is None else Alignment.from_state(state["alignment"])
         self.reference_ns = state["reference_ns"]
         self.session = msgspec.convert(state["session"], Session)
+        self.revision += 1
 
 
 def segment_quality(reading: Reading | None, alignment: Alignment | None, segment: str) -> Quality:
-    """Return the quality of one segment at an instant: the worst of how it was measured and how it was aligned."""
+    """Return the quality of one segment at an instant: the worst of how it was measured and how it was
+    aligned."""
     if reading is None:
         return "missing"
     if reading.quality == "held":

@@ -47,7 +47,8 @@ class _Block:
     first_sequence: int
     received_ns: int
     gap: Quality | None
-    """What an instant between row 0 and the first new sample is: held, missing, or None where there is no gap."""
+    """What an instant between row 0 and the first new sample is: held, missing, or None where there is no
+    gap."""
     disturbed: bool
 
 
