@@ -1,8 +1,10 @@
 """Host time: the wall clock read once at start, plus the monotonic clock since. Its jumps change nothing."""
 
 import time
+from collections.abc import Callable
 
 import msgpack
+import msgspec
 
 from brachium_wire import keys
 from brachium_wire.bus import Bus
@@ -30,9 +32,11 @@ class HostClock:
         return self._start_ns + monotonic_ns
 
 
-def tell_host_time(bus: Bus, room: str, service_id: str, clock: HostClock) -> None:
+def tell_host_time(bus: Bus, room: str, service_id: str, now_ns: Callable[[], int]) -> None:
     """Answer everyone who asks for this service's host time, as long as the bus is open."""
-    bus.serve(keys.host_time(room, service_id), lambda _key, _question: msgpack.packb({"t": clock.now_ns()}))
+    bus.serve(
+        keys.host_time(room, service_id), lambda _key, _question: msgspec.msgpack.encode({"t": now_ns()})
+    )
 
 
 def follow_host_time(
