@@ -128,5 +128,5 @@ def test_clocks_run_at_rates_of_their_own_and_tick_evenly() -> None:
     ],
 )
 def test_impossible_faults_are_refused(wrong: dict[str, object]) -> None:
-    with pytest.raises(ValueError, match="give|choose"):
+    with pytest.raises(ValueError, match=r"give|choose"):
         FaultSettings(**wrong)  # type: ignore[arg-type]
