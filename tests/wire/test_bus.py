@@ -141,6 +141,41 @@ def test_retained_values_of_many_threads_end_alike_for_early_and_late_readers(
     assert connect().fetch(SESSION) == [(SESSION, received[-1])]
 
 
+def test_what_is_kept_is_what_was_put_last_though_a_thread_is_held_up_in_between(
+    connect: Connect, until: Until, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    publisher, early = connect(), connect()
+    inbox = early.subscribe(SESSION)
+    linked(publisher, inbox, until, SESSION)
+    put, first_puts, second_is_through = publisher.put, threading.Event(), threading.Event()
+
+    def held_up(key: str, payload: bytes) -> None:
+        if payload == b"first":
+            first_puts.set()
+            second_is_through.wait(0.3)  # in vain, when the second has to wait for the first
+        put(key, payload)
+
+    monkeypatch.setattr(publisher, "put", held_up)
+
+    def second() -> None:
+        first_puts.wait(15.0)
+        publisher.retain(SESSION, b"second")
+        second_is_through.set()
+
+    thread = threading.Thread(target=second)
+    thread.start()
+    publisher.retain(SESSION, b"first")
+    thread.join()
+    received: list[bytes] = []
+
+    def both_came() -> bool:
+        received.extend(payload for _, payload in inbox.drain())
+        return len(received) == 2
+
+    until(both_came, "both values")
+    assert connect().fetch(SESSION) == [(SESSION, received[-1])]
+
+
 def test_many_threads_put_first_on_the_same_keys(connect: Connect, until: Until) -> None:
     publisher, reader = connect(), connect()
     inbox = reader.subscribe(keys.subjects("gym", "event"))

@@ -111,20 +111,20 @@ def test_bytes_are_those_of_msgpack_itself(kind: type[Message]) -> None:
 
 @given(
     st.dictionaries(
-        st.text(max_size=40),
+        st.text(max_size=10),
         st.recursive(
             st.none()
             | st.booleans()
             | st.integers(-(2**63), 2**63 - 1)
             | st.floats(allow_nan=False, allow_infinity=False)
-            | st.text(max_size=300)
+            | st.text(max_size=40)
             | st.binary(max_size=300),
             lambda inner: (
-                st.lists(inner, max_size=20) | st.dictionaries(st.text(max_size=5), inner, max_size=20)
+                st.lists(inner, max_size=17) | st.dictionaries(st.text(max_size=5), inner, max_size=6)
             ),
-            max_leaves=20,
+            max_leaves=12,
         ),
-        max_size=20,
+        max_size=17,
     )
 )
 def test_any_values_are_written_as_msgpack_writes_them(data: dict[str, Any]) -> None:
