@@ -98,11 +98,16 @@ def add_json(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--json", action="store_true", help="print figures as JSON")
 
 
-def print_json(figures: object) -> None:
-    """Print a record, a dataclass or a dict as JSON; a number that is not known is null."""
+def as_json(figures: object) -> str:
+    """Return a record, a dataclass or a dict as JSON; a number that is not known is null."""
     import msgspec
 
-    print(json.dumps(msgspec.to_builtins(figures, enc_hook=str), indent=2, allow_nan=False), flush=True)
+    return json.dumps(msgspec.to_builtins(figures, enc_hook=str), indent=2, allow_nan=False)
+
+
+def print_json(figures: object) -> None:
+    """Print the same."""
+    print(as_json(figures), flush=True)
 
 
 def stop_on_signals() -> threading.Event:

@@ -48,9 +48,7 @@ def add_wearer(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--segments", metavar="A,B", help="which carry a sensor (default: the arm's three)")
 
 
-def add_faults(
-    parser: argparse.ArgumentParser, *, loss: float = 0.0, swap: float = 0.0, wifi: str = "none"
-) -> None:
+def add_faults(parser: argparse.ArgumentParser) -> None:
     """Add what goes wrong on the way."""
     parser.add_argument("--loss", type=float, default=0.0, help="probability a packet")
     parser.add_argument("--swap", type=float, default=0.0, help="probability of a late packet")
@@ -72,9 +70,7 @@ def run(args: argparse.Namespace) -> int:
         return 0
     for subject, streams in report.streams.items():
         for segment, count in streams.items():
-            print(
-                f"{subject} {segment}: {count.sent} samples sent, {count.lost} lost, {count.swapped} out of order"
-            )
+            print(f"{subject} {segment}: {count.sent} sent, {count.lost} lost, {count.swapped} out of order")
     return 0
 
 
@@ -107,6 +103,13 @@ def settings(args: argparse.Namespace, token: str) -> "EmulateSettings":
     )
 
 
+def settings_of(words: list[str], token: str) -> "EmulateSettings":
+    """Return what a command line of this command asks for."""
+    parser = argparse.ArgumentParser()
+    configure(parser)
+    return settings(parser.parse_args(words), token)
+
+
 def node_table(chosen: "EmulateSettings") -> list[str]:
     """Return the lines of a site file that let these wearers' nodes in."""
     from brachium_nodes.emulate import node_entries
@@ -123,7 +126,7 @@ def node_table(chosen: "EmulateSettings") -> list[str]:
 
 def _token(args: argparse.Namespace) -> str:
     if args.token_file is not None:
-        return args.token_file.read_text("utf-8").strip()
+        return str(args.token_file.read_text("utf-8")).strip()
     token = os.environ.get(TOKEN_VARIABLE, "")
     if not token and not args.direct:
         raise Usage(
