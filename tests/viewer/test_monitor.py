@@ -59,9 +59,12 @@ def test_it_shows_who_was_there_before_and_who_comes(bus: Bus) -> None:
     status = encode(
         Status(node="n7", time_ns=1, connected=True, received=9, lost=1, out_of_order=0, battery_v=3.5)
     )
-    sender = threading.Thread(
-        target=lambda: [bus.put(key, status) for _ in iter(lambda: stop.wait(0.05), True)]
-    )
+
+    def send() -> None:
+        while not stop.wait(0.05):
+            bus.put(key, status)
+
+    sender = threading.Thread(target=send)
     sender.start()
     settings = MonitorSettings(endpoint=bus.endpoint, room=ROOM, json=True, seconds=20.0)
     health = monitor.run(settings, stop, out)

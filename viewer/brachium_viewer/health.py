@@ -3,6 +3,7 @@
 from dataclasses import dataclass, field
 from typing import Literal
 
+from brachium_viewer.contents import outwards
 from brachium_viewer.statistics import percentiles
 from brachium_viewer.window import SECOND, WINDOW_NS, Window
 from brachium_wire import keys
@@ -12,8 +13,6 @@ from brachium_wire.sequence import SequenceCounter
 from brachium_wire.topics import TOPICS
 
 State = Literal["live", "stale", "missing"]
-
-_OUTWARDS = ("upper_arm", "forearm", "hand")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -144,7 +143,7 @@ class Network:
 
     def report(self, now_ns: int) -> NetworkHealth:
         """Return how everything fares at `now_ns`."""
-        nodes = [node.report(*who, now_ns) for who, node in sorted(self._nodes.items(), key=_outwards)]
+        nodes = [node.report(*who, now_ns) for who, node in sorted(self._nodes.items(), key=outwards)]
         services = [service.report(*who, now_ns) for who, service in sorted(self._services.items())]
         waiting = {
             name
@@ -160,13 +159,6 @@ class Network:
             waiting=sorted(waiting),
             drops=dict(self.drops),
         )
-
-
-def _outwards(item: tuple[tuple[str, str], object]) -> tuple[str, str, int]:
-    """Order nodes by subject, side, and from the trunk outwards."""
-    subject, segment = item[0]
-    part, side = (segment[:-2], segment[-1]) if segment[-2:] in ("_r", "_l") else (segment, "")
-    return subject, side, _OUTWARDS.index(part) if part in _OUTWARDS else -1
 
 
 def state(age_s: float | None, stale_after_s: float, missing_after_s: float) -> State:

@@ -1,0 +1,148 @@
+"""Charts of the summary page as SVG text: drawn by matplotlib, without a screen and without a date."""
+
+import io
+import itertools
+import re
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from brachium_wire.table import MissingExtra
+
+Floats = npt.NDArray[np.float64]
+
+INK, QUIET, MEASURED, TRUE, SHADE = "#1d2733", "#6b7785", "#0b5cad", "#f0b35f", "#eef1f4"
+_PAPER = {"facecolor": "white", "edgecolor": "none", "pad": 1.0, "alpha": 0.85}
+POINTS = 900
+"""Points of a line at most: more than its pixels are of no use in print."""
+
+
+def _figure(width_in: float, height_in: float) -> tuple[Any, Any]:
+    try:
+        from matplotlib.backends.backend_svg import FigureCanvasSVG
+        from matplotlib.figure import Figure
+    except ImportError:
+        raise MissingExtra("the summary page needs matplotlib: pip install 'brachium[report]'") from None
+    figure = Figure(figsize=(width_in, height_in), layout="constrained")
+    FigureCanvasSVG(figure)
+    axes = figure.add_subplot()
+    for side in ("top", "right"):
+        axes.spines[side].set_visible(False)
+    for side in ("left", "bottom"):
+        axes.spines[side].set_color("#c3cad2")
+    axes.tick_params(colors=QUIET, labelsize=7.5, length=2.5, width=0.6)
+    axes.grid(axis="y", color="#e6eaee", linewidth=0.6)
+    axes.set_axisbelow(True)
+    return figure, axes
+
+
+def _svg(figure: Any, name: str) -> str:
+    import matplotlib
+
+    out = io.StringIO()
+    with matplotlib.rc_context({"svg.hashsalt": name, "svg.fonttype": "path"}):
+        figure.savefig(out, format="svg", metadata={"Date": None}, transparent=True)
+    text = out.getvalue()
+    text = text[text.index("<svg") :]
+    text = re.sub(r"<metadata>.*?</metadata>", "", text, flags=re.DOTALL)
+    # The page sets the size; and glyphs of two charts on one page must not share a name.
+    text = re.sub(r'(<svg[^>]*?) width="[^"]*"', r"\1", text, count=1)
+    text = re.sub(r'(<svg[^>]*?) height="[^"]*"', r"\1", text, count=1)
+    prefix = re.sub("[^a-z0-9]", "-", name.lower())
+    text = re.sub(r'\bid="', f'id="{prefix}-', text)
+    text = re.sub(r'href="#', f'href="#{prefix}-', text)
+    return re.sub(r"url\(#", f"url(#{prefix}-", text)
+
+
+def thinned(time: Floats, values: Floats) -> tuple[Floats, Floats]:
+    """Return a line of at most POINTS points with the same lowest and highest values along the way."""
+    if len(time) <= POINTS:
+        return time, values
+    edges = np.linspace(0, len(time), POINTS // 2 + 1).astype(np.int64)
+    keep: set[int] = {0, len(time) - 1}
+    for a, b in itertools.pairwise(edges.tolist()):
+        part = values[a:b]
+        if np.isnan(part).any():
+            keep.add(int(a + np.argmax(np.isnan(part))))  # a gap stays a gap
+        if np.isfinite(part).any():
+            keep |= {int(a + np.nanargmin(part)), int(a + np.nanargmax(part))}
+    index = np.array(sorted(keep))
+    return time[index], values[index]
+
+
+def with_gaps(time: Floats, values: Floats, longest_s: float = 0.5) -> tuple[Floats, Floats]:
+    """Return the line with a hole where two instants are further apart: the unmeasured is not drawn."""
+    holes = np.flatnonzero(np.diff(time) > longest_s) + 1
+    return np.insert(time, holes, time[holes - 1]), np.insert(values, holes, np.nan)
+
+
+def line(
+    name: str,
+    time: Floats,
+    measured: Floats,
+    unit: str,
+    *,
+    true: tuple[Floats, Floats] | None = None,
+    settled_s: float | None = None,
+    from_zero: bool = False,
+    width_in: float = 3.65,
+    height_in: float = 1.32,
+) -> str:
+    """Return a chart of one value over time, with the true one below it; before `settled_s` it is shaded."""
+    figure, axes = _figure(width_in, height_in)
+    if settled_s is not None and len(time) and settled_s > time[0]:
+        axes.axvspan(time[0], settled_s, color=SHADE, linewidth=0)
+    if true is not None:
+        axes.plot(*thinned(*with_gaps(*true)), color=TRUE, linewidth=3.0, solid_capstyle="round")
+    axes.plot(*thinned(*with_gaps(time, measured)), color=MEASURED, linewidth=1.1)
+    axes.set_xlim(time[0], max(time[-1], time[0] + 1e-3))
+    axes.set_ylabel(unit, color=QUIET, fontsize=7.5)
+    axes.set_xlabel("s", color=QUIET, fontsize=7.5, labelpad=0)
+    low, high = axes.get_ylim()
+    if from_zero:
+        axes.set_ylim(0.0, max(high, 1.0))
+    elif high - low < 10.0:  # stillness is to look still
+        middle = (high + low) / 2
+        axes.set_ylim(middle - 5.0, middle + 5.0)
+    return _svg(figure, name)
+
+
+def histogram(name: str, values: Floats, unit: str, marks: Mapping[str, float]) -> str:
+    """Return a histogram with named marks; values beyond twice the last mark are gathered at its end."""
+    figure, axes = _figure(3.65, 1.75)
+    end = max(2.0 * max(marks.values()), 1.0)
+    axes.hist(np.minimum(values, end), bins=np.linspace(0.0, end, 41).tolist(), color=MEASURED, alpha=0.85)
+    top = axes.get_ylim()[1]
+    for place, (mark, value) in enumerate(marks.items()):
+        axes.axvline(value, color=INK, linewidth=0.8, linestyle=(0, (3, 2)))
+        axes.text(
+            value + end * 0.012,
+            top * (0.96 - 0.12 * place),
+            f"{mark} {value:.1f}",
+            fontsize=7.5,
+            color=INK,
+            va="top",
+        )
+    axes.set_xlim(0.0, end)
+    axes.set_xlabel(unit, color=QUIET, fontsize=7.5, labelpad=1)
+    axes.set_ylabel("skeletons", color=QUIET, fontsize=7.5)
+    return _svg(figure, name)
+
+
+def bars(name: str, values: Mapping[str, float], unit: str) -> str:
+    """Return one horizontal bar a name, with its value beside it."""
+    figure, axes = _figure(3.65, 0.55 + 0.24 * max(len(values), 2))
+    names = list(values)[::-1]
+    numbers = [values[n] for n in names]
+    axes.grid(visible=False)
+    axes.barh(range(len(names)), numbers, height=0.6, color=MEASURED, alpha=0.85)
+    axes.set_yticks(range(len(names)), [n.replace("_", " ") for n in names])
+    reach = max([*numbers, 1e-9])
+    for i, number in enumerate(numbers):
+        axes.text(number + reach * 0.02, i, f"{number:.2f}", va="center", fontsize=7.5, color=INK)
+    axes.set_xlim(0.0, max(reach * 1.2, 1.0))
+    axes.set_ylim(-0.6, max(len(names), 2) - 0.4)
+    axes.set_xlabel(unit, color=QUIET, fontsize=7.5, labelpad=1)
+    return _svg(figure, name)

@@ -1,0 +1,208 @@
+"""The figures of a recording: loss, rate, latency, and the error against truth of an emulated wearer."""
+
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from brachium_viewer import contents as c
+from brachium_viewer.contents import ArmContents, Contents, SensorContents
+from brachium_viewer.statistics import ErrorFigures, error_figures, interpolate, percentiles, wrap_deg
+
+Floats = npt.NDArray[np.float64]
+
+CLINICAL = (
+    "shoulder_flexion",
+    "shoulder_abduction",
+    "shoulder_rotation",
+    "elbow_flexion",
+    "forearm_pronation",
+    "wrist_flexion",
+    "wrist_deviation",
+)
+TRUTH_GAP_S = 0.1
+"""Truth is interpolated between two instants at most this far apart."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class SegmentFigures:
+    """One sensor's samples: the gateway's count since the node joined, or else those that are recorded."""
+
+    node: str
+    origin: str
+    received: int
+    lost: int
+    out_of_order: int
+    late: int
+    loss_percent: float
+    counted_by: str
+    """gateway or recording."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ArmFigures:
+    """One arm's skeletons."""
+
+    skeletons: int
+    rate_hz: float | None
+    latency_p50_ms: float | None
+    """From the gateway's having the last sample needed to the recorder's having the skeleton."""
+    latency_p99_ms: float | None
+    forward: str
+    calibrated: int
+    """Skeletons after calibration; only these are compared."""
+    compared: int
+    """Of these, the ones for whose instant truth is known."""
+    quality: dict[str, dict[str, int]]
+    """Skeletons a quality, by segment."""
+    angles_deg: dict[str, ErrorFigures]
+    """Published minus true; angles that rest on an assumption are left out."""
+    positions_mm: dict[str, ErrorFigures]
+    """Distances from the true joint centres, in trunk axes."""
+    clinical_rmse_deg: float | None
+    """Root mean square over the clinical angles that are measured."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class SummaryFigures:
+    """All figures of a recording; `to_json` gives plain values."""
+
+    recording: str
+    started: str
+    duration_s: float
+    origins: list[str]
+    segments: dict[str, SegmentFigures]
+    """By `subject/segment`."""
+    arms: dict[str, ArmFigures]
+    """By `subject/side`."""
+    unreadable: dict[str, int] = field(default_factory=dict)
+    warning: str = ""
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the same as maps, lists, text and numbers."""
+        return asdict(self)
+
+
+def figures(path: Path) -> SummaryFigures:
+    """Return the figures of a recording; raises recording.RecordingError for a file that is none."""
+    return of_contents(c.load(path), path.name)
+
+
+def of_contents(contents: Contents, name: str) -> SummaryFigures:
+    """Return the figures of what a recording holds."""
+    sensors = sorted(contents.sensors.items(), key=c.outwards)
+    return SummaryFigures(
+        recording=name,
+        started=contents.metadata.get("started", ""),
+        duration_s=contents.duration_s,
+        origins=contents.origins,
+        segments={"/".join(who): _segment(sensor) for who, sensor in sensors},
+        arms={"/".join(who): _arm(arm) for who, arm in sorted(contents.arms.items()) if arm.published},
+        unreadable=contents.unreadable,
+        warning=contents.warning,
+    )
+
+
+def _segment(sensor: SensorContents) -> SegmentFigures:
+    info, status, counted = sensor.info, sensor.status, sensor.counted
+    count = counted if status is None else status
+    return SegmentFigures(
+        node=info.node if info is not None else status.node if status is not None else "",
+        origin=info.origin if info is not None else "",
+        received=count.received,
+        lost=count.lost,
+        out_of_order=count.out_of_order,
+        late=status.late if status is not None else 0,
+        loss_percent=100.0 * count.lost / max(count.received + count.lost, 1),
+        counted_by="gateway" if status is not None else "recording",
+    )
+
+
+def _arm(arm: ArmContents) -> ArmFigures:
+    published = arm.published
+    time_ns, settled = c.times_ns(published), c.calibrated(published)
+    p50, p99 = percentiles(latencies_ms(arm))
+    span_s = float(time_ns.max() - time_ns.min()) / 1e9
+    quality: dict[str, dict[str, int]] = {}
+    for skeleton in published:
+        for segment, pose in skeleton.segments.items():
+            counts = quality.setdefault(segment, {})
+            counts[pose.quality] = counts.get(pose.quality, 0) + 1
+    angles = {
+        name: f for name in _common(arm) if (f := error_figures(angle_error_deg(arm, name))) is not None
+    }
+    clinical = [angles[name].rmse for name in CLINICAL if name in angles]
+    joints = dict.fromkeys(joint for skeleton in arm.true for joint in skeleton.positions)
+    positions = {j: f for j in joints if (f := error_figures(position_error_mm(arm, j))) is not None}
+    return ArmFigures(
+        skeletons=len(published),
+        rate_hz=(len(published) - 1) / span_s if span_s > 0 else None,
+        latency_p50_ms=p50,
+        latency_p99_ms=p99,
+        forward=published[-1].forward,
+        calibrated=int(settled.sum()),
+        compared=max([0, *(f.n for f in angles.values()), *(f.n for f in positions.values())]),
+        quality=quality,
+        angles_deg=angles,
+        positions_mm=positions,
+        clinical_rmse_deg=float(np.sqrt(np.mean(np.square(clinical)))) if clinical else None,
+    )
+
+
+def _common(arm: ArmContents) -> list[str]:
+    """Return the angles that both the published and the true skeletons hold, in their order."""
+    true = {name for skeleton in arm.true for name in skeleton.angles}
+    return [name for name in dict.fromkeys(n for s in arm.published for n in s.angles) if name in true]
+
+
+def latencies_ms(arm: ArmContents) -> list[float]:
+    """Return the latencies that are known; a negative one is of another host's clock and is left out."""
+    pairs = zip(arm.published, arm.arrived_ns, strict=True)
+    found = [(arrived - s.received_ns) / 1e6 for s, arrived in pairs if s.received_ns is not None]
+    return [latency for latency in found if latency >= 0.0]
+
+
+def angle_error_deg(arm: ArmContents, name: str) -> Floats:
+    """Return published minus true (n,), within half a turn; NaN before calibration and where assumed."""
+    true = true_at(arm, _unwrapped(_ordered(arm, c.angles_rad(arm.true, [name]))))
+    error = wrap_deg(np.degrees(c.angles_rad(arm.published, [name])[:, 0] - true[:, 0]))
+    error[~c.calibrated(arm.published) | ~measured(arm, name)] = np.nan
+    return error
+
+
+def position_error_mm(arm: ArmContents, joint: str) -> Floats:
+    """Return the distance of the published from the true joint centre (n,), NaN as for angles."""
+    true = true_at(arm, _ordered(arm, c.positions_m(arm.true, joint)))
+    error: Floats = 1e3 * np.linalg.norm(c.positions_m(arm.published, joint) - true, axis=1)
+    error[~c.calibrated(arm.published) | ~measured(arm, joint)] = np.nan
+    return error
+
+
+def measured(arm: ArmContents, name: str) -> npt.NDArray[np.bool_]:
+    """Return where an angle or position does not rest on an assumption (n,)."""
+    return np.array([s.assumed.get(name) != "assumed" for s in arm.published], dtype=np.bool_)
+
+
+def true_at(arm: ArmContents, values: Floats) -> Floats:
+    """Return values (m, k) of the true skeletons, ordered by time, at the published instants, (n, k)."""
+    at = np.unique(c.times_ns(arm.true))
+    start = (
+        at[0] if len(at) else 0
+    )  # differences are small enough for float64, nanoseconds since 1970 are not
+    wanted = (c.times_ns(arm.published) - start).astype(np.float64)
+    return interpolate(wanted, (at - start).astype(np.float64), values, TRUTH_GAP_S * 1e9)
+
+
+def _ordered(arm: ArmContents, values: Floats) -> Floats:
+    """Return the rows of the true skeletons in order of time, each instant once."""
+    _, first = np.unique(c.times_ns(arm.true), return_index=True)
+    return values[first]
+
+
+def _unwrapped(angles: Floats) -> Floats:
+    """Return angles (m, 1) without jumps of a turn, so that what lies between two of them does."""
+    known = np.isfinite(angles[:, 0])
+    angles[known, 0] = np.unwrap(angles[known, 0])
+    return angles
