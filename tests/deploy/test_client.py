@@ -167,9 +167,7 @@ def test_a_program_that_fails_in_its_loop_still_ends(router_endpoint: str):
     loop = f"for key, s in brachium.skeletons(endpoint={router_endpoint!r}):\n    raise OSError('mine')"
     command = [sys.executable, "-c", f"import brachium\n{loop}"]
     with repeating(router_endpoint, keys.skeleton("lab", "p01", "right"), skeleton):
-        done = subprocess.run(
-            [sys.executable, "-c", code], capture_output=True, text=True, timeout=30, check=False
-        )
+        done = subprocess.run(command, capture_output=True, text=True, timeout=30, check=False)
     assert done.returncode == 1
     assert "OSError: mine" in done.stderr
 
@@ -177,9 +175,7 @@ def test_a_program_that_fails_in_its_loop_still_ends(router_endpoint: str):
 def test_the_example_prints_elbows_and_ends_with_ctrl_c(router_endpoint: str):
     command = [sys.executable, str(EXAMPLE), "lab", router_endpoint]
     with repeating(router_endpoint, keys.skeleton("lab", "p01", "right"), skeleton):
-        example = subprocess.Popen(
-            command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env={**os.environ}
-        )
+        example = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
         assert example.stdout is not None
         lines = [example.stdout.readline() for _ in range(5)]
         example.send_signal(signal.SIGINT)
