@@ -139,9 +139,8 @@ def _follow_theta(raw: Array, last: Array, thorax_from_upper_arm: Array) -> Arra
     result = np.where(change[:, None], other_near, one_near)
     singular: Mask = np.abs(np.cos(raw[:, 1])) < _NEAR
     if singular.any():
-        before = np.where(
-            first[:, None], 0.0, last
-        )  # an arm first seen there: theta1 is 0, the turn is theta3's
+        # For an arm first seen there theta1 is 0 and the whole turn is theta3's.
+        before = np.where(first[:, None], 0.0, last)
         result[singular] = _hold(result[singular], before[singular], thorax_from_upper_arm[singular])
     lost: Mask = ~first & ~singular & (_off_range(result) > _BOX_TOLERANCE)
     if lost.any():

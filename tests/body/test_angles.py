@@ -196,6 +196,7 @@ def test_clavicle_angles_turn_the_line_from_chest_to_shoulder(side, outward):
     assert np.allclose(found([0.0, 0.2, 0.0]), [45.0, 0.0])
     assert np.allclose(found([0.0, 0.0, 0.2]), [0.0, 45.0])
     assert np.allclose(found([0.2 * outward, 0.4, 0.0]), [45.0, 0.0])
+    assert np.allclose(found([0.1 * outward, 0.4, 0.5]), [np.degrees(np.arctan2(4, 3)), 45.0])
     full = angles.joint_angles(REST, REST, REST, side, shoulder_shift=[0, 0.2, 0], chest_to_shoulder=0.2)
     assert np.degrees(column(full, "clavicle_protraction")) == pytest.approx(45)
 

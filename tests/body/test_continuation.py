@@ -161,6 +161,27 @@ def test_flexion_goes_over_the_top_without_a_jump():
     assert np.abs(found[:, angles.INDEX["shoulder_flexion"]] - elevation).max() < 1e-9
 
 
+def test_an_arm_lowered_behind_after_passing_overhead_hangs_at_zero():
+    up = np.linspace(150.0, 179.0, 60)[:, None] * [0.0, 0.0, 1.0]
+    down = np.linspace(175.0, 0.0, 200)[:, None] * [-np.cos(np.radians(-30)), 0.0, np.sin(np.radians(-30))]
+    q = rotation.from_rotation_vector(np.radians(np.concatenate([up, down])))
+    found = follow(q, angles.joint_angles(q, rotation.IDENTITY, rotation.IDENTITY, "right"), "right")
+    swing = found[:, [angles.INDEX["shoulder_flexion"], angles.INDEX["shoulder_abduction"]]]
+    assert np.degrees(np.hypot(*swing.T)).max() <= 200.0
+    assert np.abs(swing[-1]).max() < 1e-9
+
+
+def test_a_turned_forearm_is_still_turned_after_a_gap():
+    theta = np.zeros((4, 7))
+    theta[:, 4] = np.radians([170.0, 185.0, 190.0, 192.0])
+    joints = kinematics.joint_rotations(theta, "right")
+    raw = angles.joint_angles(*joints, "right")
+    raw[2] = np.nan
+    found = follow(joints.thorax_from_upper_arm, raw, "right")
+    pronation = np.degrees(found[:, angles.INDEX["forearm_pronation"]])
+    assert np.allclose(pronation, [170.0, 185.0, np.nan, 192.0], equal_nan=True)
+
+
 def test_a_gap_leaves_the_past_and_comes_out_empty():
     q, raw = movement(abduction(), "right")
     q[200:240], raw[200:240] = np.nan, np.nan
@@ -186,7 +207,9 @@ def test_save_equals_continue():
     before = AngleTracker(1)
     follow(q[:400], raw[:400], "left", before)
     saved = before.state()
-    follow(q[400:500], raw[400:500], "left", before)  # what is saved does not change with what comes after
+    unchanged = saved.copy()
+    follow(q[400:500], raw[400:500], "left", before)
+    assert np.array_equal(saved, unchanged, equal_nan=True)
     after = AngleTracker()
     after.restore(saved.tolist())
     assert np.array_equal(follow(q[400:], raw[400:], "left", after), whole[400:], equal_nan=True)
