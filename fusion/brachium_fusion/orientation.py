@@ -65,17 +65,17 @@ class VqfFilter:
         self, gyr: Floats, acc: Floats, mag: Floats | None, mag_index: tuple[int, ...] | None
     ) -> Floats:
         """See OrientationFilter.update."""
-        if mag is None or not self._magnetometer:
+        if not self._magnetometer:
             tilted: Floats = self._filter.updateBatch(gyr, acc)[self._output]
             return tilted
-        if mag_index is None:
+        if mag is not None and mag_index is None:
             out = self._filter.updateBatch(gyr, acc, mag)
             # Before a reference was learnt (5 s) everything counts as disturbed; that is no finding.
             self.disturbed = bool(out["magDistDetected"][-1]) and self._filter.getMagRefNorm() > 0.0
             fused: Floats = out[self._output]
             return fused
         read = self._filter.getQuat9D if self._output == "quat9D" else self._filter.getQuat6D
-        rows = dict(zip(mag_index, mag, strict=True))
+        rows = {} if mag is None else dict(zip(mag_index or (), mag, strict=True))
         quats = np.empty((len(gyr), 4))
         for i in range(len(gyr)):
             row = rows.get(i)
