@@ -17,10 +17,15 @@ def feed(picture, skeleton, now_s, subject="p01", topic="skeleton"):
     return moment
 
 
-def test_nothing_is_drawn_before_the_first_skeleton():
+def test_before_the_first_skeleton_there_are_words_and_then_the_arm_at_once(arm_at):
     picture = Picture()
     assert picture.feed("p01", "calibration", "", Calibration(time_ns=1, state="waiting"), 0.1) is None
-    assert picture.tick(5.0) == {}
+    waiting = picture.tick(0.1)
+    assert waiting.keys() == {"layout", "words"}
+    assert "Waiting for skeletons" in waiting["words"].markdown
+    assert picture.tick(0.2) == {}
+    feed(picture, arm_at(0), 0.3)
+    assert picture.tick(0.3)["layout"].arms
 
 
 def test_measured_time_is_kept_and_recordings_of_another_day_begin_now(arm_at):
@@ -53,14 +58,18 @@ def test_panels_are_arranged_at_once_and_again_only_when_newcomers_have_settled(
     feed(picture, arm_at(0), 0.0)
     first = picture.tick(0.0)["layout"]
     assert isinstance(first, Layout)
-    assert [arm.path for arm in first.arms] == ["p01_right"]
+    assert [arm.path for arm in first.arms] == ["estimate/p01_right"]
     assert first.angles == tuple(plot.angle for plot in PLOTS)
     assert "layout" not in picture.tick(10.0)
     feed(picture, arm_at(0, side="left"), 11.0)
     feed(picture, arm_at(0), 11.0, topic="truth")
     assert "layout" not in picture.tick(11.0 + 0.5 * SETTLE_S)
     second = picture.tick(11.1 + SETTLE_S)["layout"]
-    assert [arm.path for arm in second.arms] == ["p01_right", "p01_left", "p01_right_truth"]
+    assert [arm.path for arm in second.arms] == [
+        "estimate/p01_right",
+        "estimate/p01_left",
+        "actual/p01_right",
+    ]
 
 
 def test_only_angles_that_exist_get_a_plot_and_its_reference(arm_at):
@@ -88,7 +97,7 @@ def test_a_stream_that_stops_is_shown_so_once_and_comes_back(arm_at):
     assert not [path for path in picture.tick(SILENT_S) if path.startswith("world/p01/right")]
     drawn = picture.tick(SILENT_S + 0.1)
     assert isinstance(drawn["world/p01/right"], Capsules)
-    assert drawn["angles/elbow_flexion/p01_right"] == Degrees(None)
+    assert drawn["angles/elbow_flexion/estimate/p01_right"] == Degrees(None)
     assert drawn["quality/p01/hand_r"] == Lane("silent")
     assert "world/p01/left" not in drawn  # the other arm still comes
     assert "world/p01/right" not in picture.tick(SILENT_S + 0.2)
@@ -138,5 +147,7 @@ def test_subjects_stand_side_by_side_in_order_of_appearance(arm_at):
     picture = Picture()
     first = feed(picture, arm_at(0), 0.0, subject="p07")[1]["world/p07/right"]
     second = feed(picture, arm_at(0), 0.0, subject="p01")[1]["world/p01/right"]
-    assert second.starts[0, 0] - first.starts[0, 0] == pytest.approx(SPACING)
-    assert {"world/p07/name", "world/p01/name"} <= picture.tick(0.0).keys()
+    assert second.starts[0, 0] - first.starts[0, 0] == pytest.approx(-SPACING)  # on the right as we face them
+    drawn = picture.tick(0.0)
+    assert {"world/p07/name", "world/p01/name"} <= drawn.keys()
+    assert "light blue = p07 right, orange = p01 right, grey = AAOS reference" in drawn["words"].markdown

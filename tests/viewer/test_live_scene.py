@@ -37,7 +37,7 @@ def test_bones_run_between_the_positions_and_keep_their_lengths(arm_at, side):
 def test_each_subject_stands_at_a_place_of_its_own(arm_at):
     first, second = (scene.draw_arm(arm_at(0.4), scene.place_of(n)) for n in (0, 1))
     assert second.starts - first.starts == pytest.approx(
-        np.tile([scene.SPACING, 0.0, 0.0], (len(first.starts), 1))
+        np.tile([-scene.SPACING, 0.0, 0.0], (len(first.starts), 1))
     )
 
 
@@ -84,9 +84,9 @@ def test_angles_are_degrees_and_an_absent_one_is_no_number(arm_at):
     skeleton = arm_at(0.4)
     known = {name: value for name, value in skeleton.angles.items() if name != "wrist_flexion"}
     drawings = scene.draw_skeleton("p01", msgspec.structs.replace(skeleton, angles=known), 0.0)
-    assert drawings["angles/wrist_flexion/p01_right"] == Degrees(None)
+    assert drawings["angles/wrist_flexion/estimate/p01_right"] == Degrees(None)
     for name, value in known.items():
-        drawn = drawings[f"angles/{name}/p01_right"]
+        drawn = drawings[f"angles/{name}/estimate/p01_right"]
         assert isinstance(drawn, Degrees)
         assert drawn.value == pytest.approx(value * 180.0 / math.pi, rel=1e-12)
     assert sum(path.startswith("angles/") for path in drawings) == 7

@@ -86,11 +86,11 @@ def test_a_recording_of_the_view_holds_the_arm(arm_at, tmp_path):
             continue
         if chunk.entity_path == "/world/p01/right":
             arm += list(zip(columns["translations"], columns["lengths"], strict=True))
-        elif chunk.entity_path == "/angles/elbow_flexion/p01_right":
+        elif chunk.entity_path == "/angles/elbow_flexion/estimate/p01_right":
             elbow += [row[0] for row in columns["scalars"] if row]
         elif chunk.entity_path == "/quality/p01/hand_r":
             lane += [row[0] for row in columns["state"] if row]
-        elif chunk.entity_path == "/angles/wrist_flexion/p01_right":
+        elif chunk.entity_path == "/angles/wrist_flexion/estimate/p01_right":
             wrist_clears += sum(bool(row) for row in columns.get("is_recursive", []))
     assert len(arm) == 30
     for translations, lengths in arm:

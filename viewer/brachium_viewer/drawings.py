@@ -70,8 +70,8 @@ class Arm:
 
     @property
     def path(self) -> str:
-        """The last part of its lines' paths."""
-        return f"{self.subject}_{self.side}" + ("_truth" if self.truth else "")
+        """The end of its lines' paths. Lines are drawn in order of their names, so the truth lies below."""
+        return f"{'actual' if self.truth else 'estimate'}/{self.subject}_{self.side}"
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,8 +11,9 @@ from brachium_viewer.scene import (
     CHEST_HEIGHT,
     PLOTS,
     QUALITY_COLOUR,
-    SPACING,
     Plot,
+    line_colours,
+    place_of,
 )
 
 TIMELINE = "time"
@@ -20,7 +21,7 @@ WINDOW_S = 20.0
 """How much of the past the plots show."""
 _MARGIN_DEG = 12.0
 _REFERENCE = (120, 128, 134, 255)
-_TRUTH_LINE = (245, 245, 245, 255)
+_TRUTH_LINE = (205, 208, 212, 255)
 
 
 def blueprint(layout: Layout) -> Any:
@@ -41,7 +42,7 @@ def blueprint(layout: Layout) -> Any:
     right = [rrb.Vertical(*(rrb.Horizontal(*row) for row in rows))] if rows else []
     return rrb.Blueprint(
         rrb.Horizontal(
-            rrb.Vertical(picture, words, row_shares=[13, 7]),
+            rrb.Vertical(picture, words, row_shares=[3, 2]),
             rrb.Vertical(*right, lanes, row_shares=[3, 1][1 - len(right) :]),
             column_shares=[10, 11],
         ),
@@ -67,7 +68,7 @@ def log_lanes(recording: rr.RecordingStream, path: str) -> None:
 
 def log_lines(recording: rr.RecordingStream, layout: Layout) -> None:
     """Log names and colours of every line of every plot, once a layout."""
-    people = list(dict.fromkeys((arm.subject, arm.side) for arm in layout.arms))
+    colours = line_colours(layout.arms)
     for plot in (p for p in PLOTS if p.angle in layout.angles):
         path = f"angles/{plot.angle}"
         reference = [f"AAOS reference {plot.low:g}°", f"AAOS reference {plot.high:g}°"]
@@ -77,11 +78,11 @@ def log_lines(recording: rr.RecordingStream, layout: Layout) -> None:
             static=True,
         )
         for arm in layout.arms:
-            colour = ARM_COLOUR[people.index((arm.subject, arm.side)) % len(ARM_COLOUR)]
+            colour = ARM_COLOUR[colours[arm.subject, arm.side]]
             line = rr.SeriesLines(
                 colors=[_TRUTH_LINE if arm.truth else colour],
                 names=[_name(arm)],
-                widths=[1.2 if arm.truth else 2.4],
+                widths=[4.0 if arm.truth else 1.8],
             )
             recording.log(f"{path}/{arm.path}", line, static=True)
 
@@ -111,7 +112,7 @@ def _eye(layout: Layout) -> Any:
     """Look at everybody from in front, from the side of the arm and a little above."""
     people = len({arm.subject for arm in layout.arms})
     sides = {arm.side for arm in layout.arms}
-    middle = SPACING * (people - 1) / 2
+    middle = (place_of(0) + place_of(people - 1)) / 2
     aside = 0.0 if len(sides) > 1 else 0.8 if "right" in sides else -0.8
     away = 1.25 + 1.1 * (people - 1)
     return rrb.EyeControls3D(

@@ -4,13 +4,16 @@ from collections.abc import Mapping
 
 from brachium_wire.messages import Calibration, Forward, Origin, Skeleton, Status
 
-KEY = "Plots: coloured = estimate, white = truth of an emulated wearer, grey = AAOS reference."
 NOT_A_DEVICE = "Brachium is a measuring and research tool, not a medical device."
 ORIGIN: Mapping[Origin, str] = {
     "worn": "worn by a person",
     "emulated": "EMULATED WEARER, nobody is measured",
     "playback": "PLAYBACK of a recording, not live",
 }
+WAITING = (
+    "### Waiting for skeletons\n\n"
+    "None has come yet. `brachium monitor` shows which services and sensors are there."
+)
 SHORT_ORIGIN: Mapping[Origin, str] = {"worn": "", "emulated": "emulated wearer", "playback": "playback"}
 FORWARD: Mapping[Forward, str] = {
     "sternum": "from the sternum sensor",
@@ -44,6 +47,13 @@ def describe(
         lines += ["", "| sensor | samples/s | lost | battery | signal |", "|---|---|---|---|---|"]
         lines += [_sensor(segment, statuses[segment]) for segment in sorted(statuses)]
     return "\n".join(lines)
+
+
+def key(colours: Mapping[tuple[str, str], str], *, truth: bool) -> str:
+    """Return what the plots' lines mean; `colours` names the colour of each (subject, side)."""
+    lines = [f"{colour} = {subject} {side}" for (subject, side), colour in colours.items()]
+    lines += ["broad pale = what the wearer really does"] if truth else []
+    return f"Plots: {', '.join(lines)}, grey = AAOS reference."
 
 
 def _calibration(calibration: Calibration | None) -> str:

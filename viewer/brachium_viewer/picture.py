@@ -12,6 +12,7 @@ from brachium_viewer.scene import (
     draw_silence,
     draw_skeleton,
     lean,
+    line_colours,
     place_of,
 )
 from brachium_wire.messages import Calibration, Message, Skeleton, Status
@@ -73,7 +74,7 @@ class Picture:
                     subject.silent.add((side, truth))
                     last = (subject.truths if truth else subject.skeletons)[side]
                     out |= draw_silence(name, last, subject.place, truth=truth)
-        if self._arms and now_s - self._slow_s >= SLOW_S:
+        if now_s - self._slow_s >= SLOW_S:
             self._slow_s = now_s
             out |= dict(self._words())
             out |= {
@@ -82,11 +83,8 @@ class Picture:
         layout = Layout(
             tuple(self._arms), tuple(p.angle for p in PLOTS if p.angle in self._angles), self._title()
         )
-        if (
-            self._arms
-            and layout != self._arranged
-            and (self._arranged is None or now_s - self._changed_s > SETTLE_S)
-        ):
+        at_once = self._arranged is None or not self._arranged.arms
+        if layout != self._arranged and (at_once or now_s - self._changed_s > SETTLE_S):
             self._arranged = layout
             out["layout"] = layout
         return out
@@ -136,7 +134,9 @@ class Picture:
                     silent=bool(subject.silent),
                 )
             )
-        yield "words", Text("\n\n".join([*sections, panel.KEY, f"*{panel.NOT_A_DEVICE}*"]))
+        key = panel.key(line_colours(self._arms), truth=any(arm.truth for arm in self._arms))
+        sections = [*sections, key] if sections else [panel.WAITING]
+        yield "words", Text("\n\n".join([*sections, f"*{panel.NOT_A_DEVICE}*"]))
 
     def _title(self) -> str:
         words = sorted(

@@ -8,12 +8,13 @@ leaning. What is not known is not drawn, and what is doubtful is grey.
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from itertools import cycle
 
 import numpy as np
 
 from brachium_body import rotation
 from brachium_body.ranges import REFERENCE
-from brachium_viewer.drawings import Capsules, Colour, Degrees, Drawing, Floats, Lane
+from brachium_viewer.drawings import Arm, Capsules, Colour, Degrees, Drawing, Floats, Lane
 from brachium_wire.messages import Quality, Skeleton
 
 CHEST_HEIGHT = 1.38
@@ -35,7 +36,14 @@ BODY: Colour = (98, 104, 112, 255)
 TRUTH: Colour = (255, 255, 255, 130)
 JOINT: Colour = (236, 238, 240, 255)
 PART_COLOUR: Mapping[str, Colour] = {"upper_arm": ORANGE, "forearm": SKY, "hand": GREEN}
-ARM_COLOUR: tuple[Colour, ...] = (SKY, ORANGE, GREEN, PURPLE, YELLOW, VERMILION)
+ARM_COLOUR: Mapping[str, Colour] = {
+    "light blue": SKY,
+    "orange": ORANGE,
+    "green": GREEN,
+    "pink": PURPLE,
+    "yellow": YELLOW,
+    "red": VERMILION,
+}
 """The line of each arm in the plots, in order of appearance."""
 
 QUALITY_COLOUR: Mapping[str, Colour] = {
@@ -60,15 +68,12 @@ _BONES = (
 _JOINT_RADIUS = {"shoulder": 0.052, "elbow": 0.043, "wrist": 0.035}
 # The figure, in trunk axes: two ends and a radius, m.
 _TORSO = (
-    # A stack of level capsules: broad chest, waist, hips.
+    # Hips to chest: capsules close beside one another make one smooth shape.
     *(
-        ((-half, -0.03, height), (half, -0.03, height), 0.092)
-        for height, half in zip(
-            (-0.07, -0.12, -0.17, -0.22, -0.27, -0.32, -0.37, -0.42, -0.47),
-            (0.105, 0.098, 0.088, 0.076, 0.066, 0.062, 0.066, 0.074, 0.078),
-            strict=True,
-        )
+        ((0.7 * x, -0.03, -0.44), (x, -0.03, -0.09), 0.092)
+        for x in (-0.1, -0.07, -0.035, 0.0, 0.035, 0.07, 0.1)
     ),
+    ((-0.07, -0.03, -0.45), (0.07, -0.03, -0.45), 0.096),
     ((-0.16, -0.01, -0.01), (0.16, -0.01, -0.01), 0.050),
     ((0.0, -0.02, 0.0), (0.0, 0.0, 0.12), 0.048),
     ((0.0, 0.015, 0.20), (0.0, 0.005, 0.25), 0.085),
@@ -156,8 +161,17 @@ def angles_deg(skeleton: Skeleton) -> dict[str, Degrees]:
 
 
 def place_of(number: int) -> float:
-    """Return the x, in m, at which the subject that appeared as `number` (from 0) stands."""
-    return SPACING * number
+    """Return the x, in m, at which the subject that appeared as `number` (from 0) stands.
+
+    Who looks at people's faces has their left on the right: so the first is the leftmost of the picture.
+    """
+    return -SPACING * number
+
+
+def line_colours(arms: Iterable[Arm]) -> dict[tuple[str, str], str]:
+    """Return the name of the line's colour of each (subject, side); the seventh looks like the first."""
+    people = dict.fromkeys((arm.subject, arm.side) for arm in arms)
+    return dict(zip(people, cycle(ARM_COLOUR), strict=False))
 
 
 def draw_skeleton(
@@ -165,14 +179,14 @@ def draw_skeleton(
 ) -> dict[str, Drawing]:
     """Return all drawings of one skeleton by their paths.
 
-    world/<subject>/<side>[_truth]              the arm
-    angles/<angle>/<subject>_<side>[_truth]     degrees
-    quality/<subject>/<segment>                 not for the truth
+    world/<subject>/<side>[_truth]                        the arm
+    angles/<angle>/<actual|estimate>/<subject>_<side>     degrees; `actual` is the truth
+    quality/<subject>/<segment>                           not for the truth
     """
-    arm = f"{subject}_{skeleton.side}" + ("_truth" if truth else "")
+    line = Arm(subject, skeleton.side, truth).path
     side = skeleton.side + ("_truth" if truth else "")
     out: dict[str, Drawing] = {f"world/{subject}/{side}": draw_arm(skeleton, place, truth=truth)}
-    out.update({f"angles/{angle}/{arm}": value for angle, value in angles_deg(skeleton).items()})
+    out.update({f"angles/{angle}/{line}": value for angle, value in angles_deg(skeleton).items()})
     if not truth:
         for segment, pose in skeleton.segments.items():
             out[f"quality/{subject}/{segment}"] = Lane(pose.quality)

@@ -14,6 +14,7 @@ from brachium_viewer.drawings import Capsules, Degrees, Drawing, Label, Lane, La
 log = logging.getLogger(__name__)
 
 APPLICATION = "brachium"
+WHITE = (240, 240, 240, 255)
 FLUSH_EVERY = 30
 """Deliveries between two waits for the viewer, so that a frozen one cannot fill the sender's memory."""
 
@@ -87,9 +88,8 @@ class Pen:
             case Lane():
                 self._lane(path, drawing.quality)
             case Label():
-                log_one(
-                    path, rr.Points3D([drawing.at], radii=[0.001], labels=[drawing.text], show_labels=True)
-                )
+                words = {"labels": [drawing.text], "show_labels": True, "colors": [WHITE]}
+                log_one(path, rr.Points3D([drawing.at], radii=[0.001], **words))
             case Text():
                 log_one(path, rr.TextDocument(drawing.markdown, media_type="text/markdown"))
             case Layout():
