@@ -8,23 +8,20 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 from heapq import merge
-from itertools import pairwise
 from math import ceil, sqrt
 
 import numpy as np
 import numpy.typing as npt
 
-from brachium_body import rotation
-from brachium_body.angles import COLUMNS, joint_angles
 from brachium_body.continuation import AngleTracker
-from brachium_body.kinematics import TRUNK_FROM_THORAX
 from brachium_body.segments import SEGMENTS, Segment, Side, arm_segments
 from brachium_nodes.link import EmulatedClock, FaultSettings, Injected, departures
 from brachium_nodes.mounting import Worn
 from brachium_nodes.movement import Array
 from brachium_nodes.person import Person, PersonSettings
 from brachium_nodes.sensors import CHIP, LEVELS, Chip, Level, generator
-from brachium_wire.messages import Quaternion, SegmentPose, SensorCalibration, Skeleton, Vector
+from brachium_nodes.truth import Truth, arm_truth, skeletons
+from brachium_wire.messages import Quaternion, SensorCalibration, Skeleton
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -93,22 +90,6 @@ class Readings:
     """(k, 3) uT."""
     mag_index: npt.NDArray[np.int64]
     """(k,) which of the n samples `mag` belongs to."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Truth:
-    """What one arm really does at n instants; numbers as messages.Skeleton has them."""
-
-    trunk_from_world: Array
-    world_from_segment: dict[str, Array]
-    """By segment, with the sternum: (n, 4)."""
-    positions: dict[str, Array]
-    """shoulder, elbow, wrist, hand in trunk axes from the chest: (n, 3) m."""
-    angles: Array
-    """(n, len(angles.COLUMNS)) rad, in principal ranges."""
-    thorax_from_upper_arm: Array
-    shoulder_shift: Array
-    """(n, 3) m in trunk axes."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -188,32 +169,7 @@ class Wearer:
 
     def truth(self, time_s: npt.ArrayLike, side: Side) -> Truth:
         """Return what one arm really does at true times (n,) s; angles in their principal ranges."""
-        t = np.atleast_1d(np.asarray(time_s, dtype=np.float64))
-        trunk, arm = self.person.trunk(t), self.person.arm(t, side)
-        trunk_from_world = rotation.multiply(TRUNK_FROM_THORAX, rotation.inverse(trunk.world_from_thorax))
-        chain = (trunk.world_from_thorax, *arm.world_from.values())
-        shoulder, elbow, wrist = (
-            rotation.multiply(rotation.inverse(near), far) for near, far in pairwise(chain)
-        )
-        angles = joint_angles(
-            shoulder,
-            elbow,
-            wrist,
-            side,
-            calibration_from_thorax=rotation.multiply(
-                rotation.inverse(TRUNK_FROM_THORAX), trunk.world_from_thorax
-            ),
-            shoulder_shift=arm.shift,
-            chest_to_shoulder=self.person.lengths.chest_to_shoulder,
-        )
-        return Truth(
-            trunk_from_world,
-            dict(zip(("sternum", *arm_segments(side)), chain, strict=True)),
-            {name: rotation.rotate(trunk_from_world, p - trunk.chest) for name, p in arm.joints.items()},
-            angles,
-            shoulder,
-            arm.shift,
-        )
+        return arm_truth(self.person, np.atleast_1d(np.asarray(time_s, dtype=np.float64)), side)
 
     def skeletons(
         self, time_s: npt.ArrayLike, side: Side, start_ns: int, tracker: AngleTracker
@@ -222,18 +178,8 @@ class Wearer:
 
         `tracker` follows one arm; keep it from call to call, so that angles go on without jumps.
         """
-        tracker.grow(1)
         t = np.atleast_1d(np.asarray(time_s, dtype=np.float64))
-        truth = self.truth(t, side)
-        row = np.zeros(1, dtype=np.intp)
-        angles = [
-            tracker.step(row, truth.angles[i : i + 1], truth.thorax_from_upper_arm[i : i + 1], side)[0]
-            for i in range(len(t))
-        ]
-        return [
-            _skeleton(truth, i, angles[i], side, start_ns + round(1e9 * at))
-            for i, at in enumerate(t.tolist())
-        ]
+        return skeletons(arm_truth(self.person, t, side), t, side, start_ns, tracker)
 
     def _make_block(self, segment: Segment, block: int) -> tuple[Array, Array, Array, Array]:
         """Return time, acc, gyr, mag of one block. It is always made whole, so no cut changes a bit."""
@@ -265,28 +211,3 @@ class Wearer:
 
 _PAGE = 4096
 """Blocks whose walk is drawn at once: more than an hour."""
-
-
-def _skeleton(truth: Truth, i: int, angles: Array, side: Side, time_ns: int) -> Skeleton:
-    return Skeleton(
-        time_ns=time_ns,
-        side=side,
-        origin="emulated",
-        forward="facing",
-        trunk_from_world=_four(truth.trunk_from_world[i]),
-        segments={
-            name: SegmentPose(quality="good", world_from_segment=_four(q[i]))
-            for name, q in truth.world_from_segment.items()
-        },
-        positions={name: _three(p[i]) for name, p in truth.positions.items()},
-        angles=dict(zip(COLUMNS, angles.tolist(), strict=True)),
-        shoulder_shift=_three(truth.shoulder_shift[i]),
-    )
-
-
-def _three(v: Array) -> Vector:
-    return (float(v[0]), float(v[1]), float(v[2]))
-
-
-def _four(q: Array) -> Quaternion:
-    return (float(q[0]), float(q[1]), float(q[2]), float(q[3]))
