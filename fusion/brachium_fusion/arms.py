@@ -6,6 +6,7 @@ go; the memory takes each arm's rows one after another.
 """
 
 from collections.abc import Sequence
+from functools import lru_cache
 from math import radians
 from typing import Any, NamedTuple
 
@@ -29,7 +30,7 @@ from brachium_body.kinematics import JOINTS, TRUNK_FROM_THORAX, SegmentOrientati
 from brachium_body.lengths import ArmLengths, from_measured
 from brachium_body.segments import SIDES, Side, arm_segments
 from brachium_fusion.pose import Alignment
-from brachium_fusion.subject import Instant, Settings, Subject, segment_quality
+from brachium_fusion.subject import Instant, Settings, Subject
 from brachium_fusion.track import Reading
 from brachium_wire.messages import Forward, Origin, Quality, SegmentPose, Session, Skeleton
 
@@ -45,8 +46,8 @@ cheap gyroscope (0.02 deg/s). A working assumption, stated in docs/conventions.m
 WITHHOLD_DEG = 15.0
 """Angles that rest on heading are left out when it is less certain than this."""
 
-_SLOTS = 4  # sternum, upper arm, forearm, hand
-_NOTHING: Floats = np.full(4, np.nan)
+_SLOTS: dict[Side, tuple[str, str, str, str]] = {side: ("sternum", *arm_segments(side)) for side in SIDES}
+_NOTHING = Reading(np.full(4, np.nan), np.full(4, np.nan), 0.0, "missing", 0, 0)
 _ON_HEADING = np.array([INDEX[n] for n in SHOULDER if n != "isb_elevation"])
 _RANK: dict[Quality, int] = {
     "good": 0,
@@ -60,6 +61,9 @@ _RANK: dict[Quality, int] = {
 """The worse quality wins where several segments meet; `held` tells more about now than how it was aligned."""
 
 
+_GOOD: frozenset[Quality | None] = frozenset({"good", None})
+
+
 class Row(NamedTuple):
     """One arm at one instant, and all that it is computed from."""
 
@@ -70,69 +74,60 @@ class Row(NamedTuple):
     readings: tuple[Reading | None, ...]
     qualities: tuple[Quality | None, ...]
     """Per slot; None where the subject wears no sensor there."""
-    turn: Floats
-    """(4, 4) heading correction of each slot's sensor."""
-    sensor_from_segment: Floats
-    """(4, 4)."""
-    trunk_from_world: Floats
-    """(4,) while no sternum sensor says otherwise."""
-    lengths: ArmLengths
-    stated: StatedAngles
-    forward: Forward
-    origin: Origin
+    frame: "_Frame"
     withhold_heading: bool
-    sternum_aligned: bool
 
 
 def rows_of(subject_id: str, subject: Subject, instant: Instant) -> list[Row]:
     """Return a row for each side of which an arm segment is known at the instant."""
     rows = []
-    for side in SIDES:
-        arm = arm_segments(side)
-        if not any(instant.readings.get(segment) for segment in arm):
+    found = instant.readings
+    for side, slots in _SLOTS.items():
+        readings = (found.get(slots[0]), found.get(slots[1]), found.get(slots[2]), found.get(slots[3]))
+        if readings[1] is None and readings[2] is None and readings[3] is None:
             continue
-        slots = ("sternum", *arm)
         frame = _frame(subject, instant, side)
+        qualities = tuple(
+            [
+                None if reading is None and slot not in found else _quality(reading, aligned)
+                for slot, reading, aligned in zip(slots, readings, frame.aligned, strict=True)
+            ]
+        )
+        uncertain = False
+        if frame.drifts:
+            age_s = 1e-9 * (instant.time_ns - subject.reference_ns)
+            uncertain = HEADING_SD_DEG + HEADING_DRIFT_DEG_S * age_s > WITHHOLD_DEG
         rows.append(
-            Row(
-                subject=subject_id,
-                side=side,
-                time_ns=instant.time_ns,
-                received_ns=instant.received_ns,
-                readings=tuple(instant.readings.get(s) for s in slots),
-                qualities=tuple(
-                    segment_quality(instant.readings[s], instant.alignment, s)
-                    if s in instant.readings
-                    else None
-                    for s in slots
-                ),
-                turn=frame.turn,
-                sensor_from_segment=frame.sensor_from_segment,
-                trunk_from_world=frame.trunk_from_world,
-                lengths=frame.lengths,
-                stated=frame.stated,
-                forward="none" if instant.alignment is None else instant.alignment.forward,
-                origin=frame.origin,
-                withhold_heading=frame.drifts
-                and HEADING_SD_DEG + HEADING_DRIFT_DEG_S * 1e-9 * (instant.time_ns - subject.reference_ns)
-                > WITHHOLD_DEG,
-                sternum_aligned=instant.alignment is not None and "sternum" in instant.alignment.mounting,
-            )
+            Row(subject_id, side, instant.time_ns, instant.received_ns, readings, qualities, frame, uncertain)
         )
     return rows
+
+
+def _quality(reading: Reading | None, aligned: Quality) -> Quality:
+    """Return the worse of how a segment was measured at an instant and how it was aligned."""
+    if reading is None:
+        return "missing"
+    return reading.quality if aligned == "good" or reading.quality == "held" else aligned
 
 
 class _Frame(NamedTuple):
     """What stays the same for an arm between two calibrations."""
 
     revision: int
-    turn: Floats
-    sensor_from_segment: Floats
-    trunk_from_world: Floats
-    lengths: ArmLengths
+    aligned: tuple[Quality, ...]
+    """Per slot: good, heading_assumed or uncalibrated."""
+    numbers: Floats
+    """(40,): per slot the turn of its heading and sensor_from_segment, then trunk_from_world while no sternum
+    sensor says otherwise, then the four lengths."""
+    turned: bool
+    """Some heading is turned."""
     stated: StatedAngles
+    forward: Forward
     origin: Origin
     drifts: bool
+    """Nothing keeps the heading: no magnetometer, no sternum sensor."""
+    sternum: bool
+    """A sternum sensor is aligned."""
 
 
 def _frame(subject: Subject, instant: Instant, side: Side) -> _Frame:
@@ -140,9 +135,9 @@ def _frame(subject: Subject, instant: Instant, side: Side) -> _Frame:
     known = subject.frames.get(side)
     if isinstance(known, _Frame) and known.revision == subject.revision:
         return known
-    slots = ("sternum", *arm_segments(side))
+    slots = _SLOTS[side]
     alignment = instant.alignment or Alignment(world_from_trunk=_facing(instant.session, subject))
-    turn = np.tile(rotation.IDENTITY, (_SLOTS, 1))
+    turn = np.tile(rotation.IDENTITY, (len(slots), 1))
     sensor_from_segment = turn.copy()
     for index, segment in enumerate(slots):
         track = subject.tracks.get(segment)
@@ -155,14 +150,29 @@ def _frame(subject: Subject, instant: Instant, side: Side) -> _Frame:
     origins = {track.info.origin for track in tracks}
     frame = _Frame(
         revision=subject.revision,
-        turn=turn,
-        sensor_from_segment=sensor_from_segment,
-        trunk_from_world=rotation.inverse(alignment.world_from_trunk),
-        lengths=lengths_of(instant.session),
+        aligned=tuple(
+            "uncalibrated"
+            if s not in alignment.mounting
+            else "heading_assumed"
+            if s in alignment.assumed
+            else "good"
+            for s in slots
+        ),
+        numbers=np.concatenate(
+            [
+                turn.ravel(),
+                sensor_from_segment.ravel(),
+                rotation.inverse(alignment.world_from_trunk),
+                np.asarray(lengths_of(instant.session)),
+            ]
+        ),
+        turned=any(alignment.heading.values()),
         stated=_stated(instant.session),
+        forward=alignment.forward,
         origin="emulated" if "emulated" in origins else "playback" if "playback" in origins else "worn",
         drifts=not any(t.magnetometer or t.info.orientation_only for t in tracks)
         and "sternum" not in subject.tracks,
+        sternum="sternum" in alignment.mounting,
     )
     subject.frames[side] = frame
     return frame
@@ -197,14 +207,14 @@ class Arms:
         if not rows:
             return []
         left = np.array([row.side == "left" for row in rows])
+        frames = [row.frame for row in rows]
+        numbers = np.concatenate([frame.numbers for frame in frames]).reshape(-1, 40)
         world_from_sensor = _orientations(rows)
-        turn = np.array([row.turn for row in rows])
-        world_from_sensor = rotation.multiply(turn, world_from_sensor)
-        world_from_segment = rotation.multiply(
-            world_from_sensor, np.array([row.sensor_from_segment for row in rows])
-        )
-        trunk_from_world = np.array([row.trunk_from_world for row in rows])
-        thorax_known = np.array([row.sternum_aligned and row.readings[0] is not None for row in rows])
+        if any(frame.turned for frame in frames):
+            world_from_sensor = rotation.multiply(numbers[:, :16].reshape(-1, 4, 4), world_from_sensor)
+        world_from_segment = rotation.multiply(world_from_sensor, numbers[:, 16:32].reshape(-1, 4, 4))
+        trunk_from_world = numbers[:, 32:36]
+        thorax_known = np.array([row.frame.sternum and row.readings[0] is not None for row in rows])
         from_pose = None
         if thorax_known.any():
             thorax_from_world = rotation.inverse(world_from_segment[:, 0])
@@ -228,9 +238,7 @@ class Arms:
         drifting = np.array([row.withhold_heading for row in rows])
         if drifting.any():
             angles[np.ix_(drifting, _ON_HEADING)] = np.nan
-        places = withhold(
-            positions(*full, np.array([np.asarray(row.lengths) for row in rows]), left), codes.positions
-        )
+        places = withhold(positions(*full, numbers[:, 36:], left), codes.positions)
         return _messages(
             rows,
             world_from_sensor,
@@ -283,18 +291,11 @@ class Arms:
 
 def _orientations(rows: Sequence[Row]) -> Floats:
     """Return world_from_sensor (n, 4 slots, 4) at the rows' instants, NaN where nothing is known."""
-    before, after, fraction = [], [], []
-    for row in rows:
-        for reading in row.readings:
-            if reading is None:
-                before.append(_NOTHING)
-                after.append(_NOTHING)
-                fraction.append(0.0)
-            else:
-                before.append(reading.before)
-                after.append(reading.after)
-                fraction.append(reading.fraction)
-    return rotation.slerp(np.array(before), np.array(after), np.array(fraction)).reshape(-1, _SLOTS, 4)
+    readings = [reading or _NOTHING for row in rows for reading in row.readings]
+    before = np.concatenate([reading.before for reading in readings]).reshape(-1, 4)
+    after = np.concatenate([reading.after for reading in readings]).reshape(-1, 4)
+    fraction = np.array([reading.fraction for reading in readings])
+    return rotation.slerp(before, after, fraction).reshape(-1, 4, 4)
 
 
 def _turns(arms: npt.NDArray[np.intp]) -> npt.NDArray[np.intp]:
@@ -308,10 +309,10 @@ def _turns(arms: npt.NDArray[np.intp]) -> npt.NDArray[np.intp]:
 
 def _stated_rows(rows: Sequence[Row]) -> StatedAngles:
     return StatedAngles(
-        elbow_flexion=np.array([row.stated.elbow_flexion for row in rows]),
-        forearm_pronation=np.array([row.stated.forearm_pronation for row in rows]),
-        wrist_flexion=np.array([row.stated.wrist_flexion for row in rows]),
-        wrist_deviation=np.array([row.stated.wrist_deviation for row in rows]),
+        elbow_flexion=np.array([row.frame.stated.elbow_flexion for row in rows]),
+        forearm_pronation=np.array([row.frame.stated.forearm_pronation for row in rows]),
+        wrist_flexion=np.array([row.frame.stated.wrist_flexion for row in rows]),
+        wrist_deviation=np.array([row.frame.stated.wrist_deviation for row in rows]),
     )
 
 
@@ -344,36 +345,28 @@ def _messages(
     sensors, segments = world_from_sensor.tolist(), world_from_segment.tolist()
     trunks, values, points = trunk_from_world.tolist(), angles.tolist(), places.tolist()
     rests_on = ((angle_codes == ASSUMED).any(axis=1) | (place_codes == ASSUMED).any(axis=1)).tolist()
+    patterns = [_pattern(row.tobytes()) for row in np.logical_not(np.isnan(angles))]
+    complete_places = (~np.isnan(places[..., 0])).all(axis=1).tolist()
     skeletons = []
     for i, row in enumerate(rows):
-        poses: dict[str, SegmentPose] = {}
-        for slot, segment in enumerate(("sternum", *arm_segments(row.side))):
-            quality = row.qualities[slot]
-            reading = row.readings[slot]
-            if quality is None:
-                continue
-            if reading is None:
-                poses[segment] = SegmentPose(quality="missing")
-            else:
-                poses[segment] = SegmentPose(
-                    quality=quality,
-                    sequence=reading.sequence,
-                    world_from_segment=tuple(segments[i][slot]),
-                    world_from_sensor=tuple(sensors[i][slot]),
-                )
-        given = {name: value for name, value in zip(COLUMNS, values[i], strict=True) if value == value}
-        known = {name: tuple(p) for name, p in zip(JOINTS, points[i], strict=True) if p[0] == p[0]}
+        given = patterns[i].named(values[i])
+        known = {
+            name: (p[0], p[1], p[2])
+            for name, p in zip(JOINTS, points[i], strict=True)
+            if complete_places[i] or p[0] == p[0]
+        }
         assumed: dict[str, Quality] = {}
-        if rests_on[i] or any(q is not None and q != "good" for q in row.qualities):
+        if rests_on[i] or not _GOOD.issuperset(row.qualities):
             assumed = _qualities(row.qualities, angle_codes[i], place_codes[i], given.keys() | known.keys())
+        frame = row.frame
         skeletons.append(
             Skeleton(
                 time_ns=row.time_ns,
                 side=row.side,
-                origin=row.origin,
-                forward=row.forward,
-                trunk_from_world=tuple(trunks[i]),
-                segments=poses,
+                origin=frame.origin,
+                forward=frame.forward,
+                trunk_from_world=_four(trunks[i]),
+                segments=_poses(row, sensors[i], segments[i]),
                 positions=known,
                 angles=given,
                 assumed=assumed,
@@ -381,6 +374,45 @@ def _messages(
             )
         )
     return skeletons
+
+
+def _poses(row: Row, sensors: list[list[float]], segments: list[list[float]]) -> dict[str, SegmentPose]:
+    poses: dict[str, SegmentPose] = {}
+    for slot, segment in enumerate(_SLOTS[row.side]):
+        quality, reading = row.qualities[slot], row.readings[slot]
+        if quality is None:
+            continue
+        if reading is None:
+            poses[segment] = SegmentPose(quality="missing")
+        else:
+            poses[segment] = SegmentPose(
+                quality=quality,
+                sequence=reading.sequence,
+                world_from_segment=_four(segments[slot]),
+                world_from_sensor=_four(sensors[slot]),
+            )
+    return poses
+
+
+def _four(values: list[float]) -> tuple[float, float, float, float]:
+    return (values[0], values[1], values[2], values[3])
+
+
+class _Pattern(NamedTuple):
+    """Which of a row's angles are known; the same few patterns come again and again."""
+
+    names: tuple[str, ...]
+    indices: tuple[int, ...]
+
+    def named(self, values: list[float]) -> dict[str, float]:
+        """Return the known angles by name."""
+        return dict(zip(self.names, [values[i] for i in self.indices], strict=True))
+
+
+@lru_cache(maxsize=64)
+def _pattern(bits: bytes) -> _Pattern:
+    indices = tuple(i for i, bit in enumerate(bits) if bit)
+    return _Pattern(tuple(COLUMNS[i] for i in indices), indices)
 
 
 def _qualities(

@@ -75,10 +75,9 @@ def solve(subject: str, contents: Contents, settings: Settings) -> tuple[Pipelin
     for change in changes:
         pipeline.apply(subject, change)
     solved: list[Solved] = []
-    for count, (key, payload) in enumerate(contents.samples):
-        pipeline.feed(key, payload)
-        if count % DRAIN == 0:
-            solved.extend(pipeline.skeletons())
+    for first in range(0, len(contents.samples), DRAIN):
+        pipeline.feed_all(contents.samples[first : first + DRAIN])
+        solved.extend(pipeline.skeletons())
     pipeline.finish()
     solved.extend(pipeline.skeletons())
     return pipeline, solved

@@ -10,6 +10,7 @@ everything that piled up in one go over arrays of arms.
 """
 
 from collections import Counter
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import msgpack
@@ -17,9 +18,9 @@ import msgpack
 from brachium_fusion.arms import Arms, Row, rows_of
 from brachium_fusion.subject import Change, Settings, Subject
 from brachium_wire import keys
-from brachium_wire.codec import WireError, decode, decode_topic, encode
+from brachium_wire.codec import WireError, decode_batch, decode_topic, encode
 from brachium_wire.messages import Calibration, Info, SampleBatch, Skeleton, Snapshot
-from brachium_wire.samples import Samples, read_samples
+from brachium_wire.samples import Samples, read_many
 from brachium_wire.topics import TOPICS
 
 _IMU_BYTES = TOPICS["imu"].max_bytes
@@ -47,21 +48,40 @@ class Pipeline:
 
     def feed(self, key: keys.Key, payload: bytes) -> None:
         """Take the bytes of a sensor's `imu` or `info` topic; other topics do not concern it."""
-        if key.topic == "imu":
+        self.feed_all([(key, payload)])
+
+    def feed_all(self, messages: Sequence[tuple[keys.Key, bytes]]) -> None:
+        """Take many messages in order of arrival, with the same outcome as one by one."""
+        batches: list[SampleBatch] = []
+        opened: list[WireError | None] = []
+        for key, payload in messages:
+            if key.topic != "imu":
+                continue
             try:
-                samples = read_samples(decode(payload, SampleBatch, _IMU_BYTES))
+                batches.append(decode_batch(payload, _IMU_BYTES))
+                opened.append(None)
             except WireError as error:
-                self._refuse(key, error)
-                return
-            self.samples(key.subject, key.detail, samples)
-        elif key.topic == "info":
-            try:
-                info = decode_topic(payload, "info")
-            except WireError as error:
-                self._refuse(key, error)
-                return
-            assert isinstance(info, Info)
-            self.subject(key.subject).inform(key.detail, info)
+                opened.append(error)
+        samples = iter(read_many(batches))
+        closed = iter(opened)
+        for key, payload in messages:
+            if key.topic == "imu":
+                result = next(closed) or next(samples)
+                if isinstance(result, WireError):
+                    self._refuse(key, result)
+                else:
+                    self.samples(key.subject, key.detail, result)
+            elif key.topic == "info":
+                self._inform(key, payload)
+
+    def _inform(self, key: keys.Key, payload: bytes) -> None:
+        try:
+            info = decode_topic(payload, "info")
+        except WireError as error:
+            self._refuse(key, error)
+            return
+        assert isinstance(info, Info)
+        self.subject(key.subject).inform(key.detail, info)
 
     def samples(self, subject_id: str, segment: str, samples: Samples) -> None:
         """Take a batch of samples."""

@@ -17,7 +17,7 @@ from brachium_wire import keys
 from brachium_wire.bus import DEFAULT_ENDPOINT, Bus, Inbox
 from brachium_wire.codec import Drop, WireError, decode, decode_topic, encode
 from brachium_wire.heart import Heart
-from brachium_wire.messages import Answer, Calibration, Command, Event, Session
+from brachium_wire.messages import Answer, Calibration, Command, Event
 
 log = logging.getLogger(__name__)
 
@@ -62,16 +62,15 @@ class FusionService:
         self._waiting: dict[str, list[tuple[float, Reply]]] = {}
         for verb in ("calibrate", "record"):
             bus.serve_later(keys.commands(settings.room, verb), self._on_command)
-        for tail in ("imu/*/info", "session"):
-            for key, payload in bus.fetch(keys.subjects(settings.room, tail)):
-                self._heard(key, payload)
+        self._heard(bus.fetch(keys.subjects(settings.room, "imu/*/info")))
+        for key, payload in bus.fetch(keys.subjects(settings.room, "session")):
+            self._heard_session(key, payload)
 
     def turn(self) -> None:
         """Take what arrived, publish what it gives."""
-        for key, payload in self._inbox.drain():
-            self._heard(key, payload)
         for key, payload in self._sessions.drain():
-            self._heard(key, payload)
+            self._heard_session(key, payload)
+        self._heard(self._inbox.drain())
         self._publish()
         with self._lock:
             asked, self._asked = self._asked, []
@@ -89,19 +88,25 @@ class FusionService:
         self._beat(now=True)
         self._heart.end()
 
-    def _heard(self, key: str, payload: bytes) -> None:
+    def _heard(self, messages: list[tuple[str, bytes]]) -> None:
+        parsed = []
+        for key, payload in messages:
+            try:
+                parsed.append((keys.parse(key), payload))
+            except keys.BadKey:
+                self._door[Drop.BAD_KEY.value] += 1
+        self._pipeline.feed_all(parsed)
+
+    def _heard_session(self, key: str, payload: bytes) -> None:
         try:
-            parsed = keys.parse(key)
-            if parsed.topic == "session":
-                session = decode_topic(payload, "session")
-                assert isinstance(session, Session)
-                self._apply(parsed.subject, "session", msgspec.to_builtins(session))
-            else:
-                self._pipeline.feed(parsed, payload)
+            subject = keys.parse(key).subject
+            session = decode_topic(payload, "session")
         except keys.BadKey:
             self._door[Drop.BAD_KEY.value] += 1
         except WireError as error:
             self._door[error.drop.value] += 1
+        else:
+            self._apply(subject, "session", msgspec.to_builtins(session))
 
     def _publish(self) -> None:
         for solved in self._pipeline.skeletons():

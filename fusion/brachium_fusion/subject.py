@@ -18,7 +18,7 @@ from brachium_fusion.orientation import FilterName
 from brachium_fusion.pose import Alignment, PoseName, PoseSensor, align, pose_orientations
 from brachium_fusion.track import Reading, SegmentTrack
 from brachium_wire.codec import Drop
-from brachium_wire.messages import Calibration, Info, Quality, Session
+from brachium_wire.messages import Calibration, Info, Session
 from brachium_wire.samples import Samples
 
 Floats = npt.NDArray[np.float64]
@@ -199,26 +199,30 @@ class Subject:
                 self.session,
             )
             for track in self.tracks.values():
-                track.forget(now)
+                track.forget(self._next_ns or now)
 
     def _readings(self, now: int) -> dict[str, Reading | None] | None:
         """Return every segment's orientation, or None while one that is alive has not come so far."""
-        begun = [
-            (s, t, self.received_ns - t.last_ns - t.batch_ns) for s, t in self.tracks.items() if t.last_ns
-        ]
-        reached = [t.last_ns >= now for _, t, _ in begun]
-        patience = -(1 << 62) if self._ended else HELD_NS
-        if not any(reached) or any(
-            behind <= patience for (_, _, behind), there in zip(begun, reached, strict=True) if not there
-        ):
+        reached = False
+        for track in self.tracks.values():
+            if track.last_ns >= now:
+                reached = True
+            elif track.last_ns and not self._ended and self._behind(track) <= HELD_NS:
+                return None
+        if not reached:
             return None
         readings: dict[str, Reading | None] = {}
-        for (segment, track, behind), there in zip(begun, reached, strict=True):
-            if there:
+        for segment, track in self.tracks.items():
+            if track.last_ns >= now:
                 readings[segment] = track.at(now)
-            else:
-                readings[segment] = None if self._ended or behind > MISSING_NS else track.latest()
+            elif track.last_ns:
+                gone = self._ended or self._behind(track) > MISSING_NS
+                readings[segment] = None if gone else track.latest()
         return readings
+
+    def _behind(self, track: SegmentTrack) -> int:
+        """Return how far a sensor is behind the newest arrival, beyond what its own batches explain."""
+        return self.received_ns - track.last_ns - track.batch_ns
 
     def _first_tick(self, time_ns: int) -> int | None:
         if self._times is None:
@@ -363,20 +367,6 @@ class Subject:
         self.reference_ns = state["reference_ns"]
         self.session = msgspec.convert(state["session"], Session)
         self.revision += 1
-
-
-def segment_quality(reading: Reading | None, alignment: Alignment | None, segment: str) -> Quality:
-    """Return the quality of one segment at an instant: the worst of how it was measured and how it was
-    aligned."""
-    if reading is None:
-        return "missing"
-    if reading.quality == "held":
-        return "held"
-    if alignment is None or segment not in alignment.mounting:
-        return "uncalibrated"
-    if segment in alignment.assumed:
-        return "heading_assumed"
-    return reading.quality
 
 
 def _array(values: Sequence[float] | None) -> Floats | None:

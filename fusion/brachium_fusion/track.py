@@ -156,11 +156,13 @@ class SegmentTrack:
         self._append(samples, quats, kind, disturbed=False)
 
     def _note_still(self, gyr: Floats, times: list[int]) -> None:
-        turning = np.einsum("ij,ij->i", gyr, gyr) > STILL_RAD_S**2
         if self.still_since_ns == 0:
             self.still_since_ns = times[0]
-        if turning.any():
-            self.still_since_ns = times[int(np.flatnonzero(turning)[-1])] + 1
+        squared = np.einsum("ij,ij->i", gyr, gyr).tolist()
+        for i in range(len(squared) - 1, -1, -1):
+            if squared[i] > STILL_RAD_S**2:
+                self.still_since_ns = times[i] + 1
+                return
 
     def _is_disturbed(self, now_ns: int) -> bool:
         if not self._filter.disturbed:
@@ -228,8 +230,9 @@ class SegmentTrack:
 
     def forget(self, before_ns: int) -> None:
         """Let go of batches that end before an instant; the last one is always kept."""
-        while len(self._blocks) > 1 and self._blocks[0].times[-1] < before_ns:
-            self._blocks.popleft()
+        blocks = self._blocks
+        while len(blocks) > 1 and blocks[0].times[-1] < before_ns:
+            blocks.popleft()
 
     def state(self) -> dict[str, Any]:
         """Return all that changes, as plain values."""

@@ -7,7 +7,7 @@ from typing import TypeVar
 import msgpack
 import msgspec
 
-from brachium_wire.messages import Message, SampleBatch
+from brachium_wire.messages import Command, Message, SampleBatch
 from brachium_wire.plausible import fault
 from brachium_wire.topics import TOPICS
 
@@ -89,6 +89,29 @@ def decode(payload: bytes, kind: type[T], max_bytes: int = 1 << 20) -> T:
     Unknown fields are ignored, another kind or version is refused.
     """
     return convert(unpack(payload, max_bytes), kind)
+
+
+def decode_batch(payload: bytes, max_bytes: int) -> SampleBatch:
+    """Return what `decode` returns for a batch, at a tenth of the time: sensors send thousands a second.
+
+    One pass parses and checks types, the size bounds what it can claim, and only what passes in every respect is
+    taken; anything else is left to `decode`, which says what is wrong.
+    """
+    if len(payload) <= max_bytes:
+        try:
+            message = _batch_decoder.decode(payload)
+        except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError):
+            pass
+        else:
+            if type(message) is SampleBatch:
+                return message
+    return decode(payload, SampleBatch, max_bytes)
+
+
+# msgspec insists on the tag only where a second kind could come.
+_batch_decoder: msgspec.msgpack.Decoder[SampleBatch | Command] = msgspec.msgpack.Decoder(
+    SampleBatch | Command
+)
 
 
 def convert(value: dict[str, object], kind: type[T]) -> T:

@@ -1,9 +1,11 @@
 """The numbers of a batch: blocks of bytes to arrays and back, checked once, here."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import isfinite
 from operator import lt
 from struct import unpack
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -21,6 +23,8 @@ MAX_GYR = 100.0
 MAX_MAG = 10_000.0
 MAX_SAMPLES = 256
 """Samples in one batch; more than a second at any usual rate would be a burst, not a batch."""
+_FAR = 1 << 62
+"""Bound of all counters and times, so that sums of them stay within int64."""
 MAX_SPAN_NS = 4_000_000_000
 """Offsets are u32 ns, so a batch spans at most 4.29 s."""
 
@@ -53,14 +57,62 @@ class Samples:
 
 def read_samples(batch: SampleBatch) -> Samples:
     """Return the arrays of a batch, or raise WireError naming what is wrong with it."""
-    if (
-        not 0 <= batch.sequence < 1 << 62
-        or not 0 < batch.time_ns < 1 << 62
-        or not 0 <= batch.device_us < 1 << 62
+    result = read_many([batch])[0]
+    if isinstance(result, WireError):
+        raise result
+    return result
+
+
+def read_many(batches: Sequence[SampleBatch]) -> list[Samples | WireError]:
+    """Return each batch's arrays, or what is wrong with it; the numbers of all are looked at together."""
+    heads = [_head(batch) for batch in batches]
+    blocks: list[bytes] = []
+    for head in heads:
+        if isinstance(head, _Head):
+            blocks += head.blocks
+    numbers = np.frombuffer(b"".join(blocks), dtype="<f4").astype(np.float64).reshape(-1, 3)
+    # One look settles nearly all: MAX_GYR is the smallest of the limits. NaN compares false.
+    sound = len(numbers) == 0 or bool(np.maximum.reduce(np.abs(numbers), axis=None) <= MAX_GYR)
+    results: list[Samples | WireError] = []
+    row = 0
+    for batch, head in zip(batches, heads, strict=True):
+        if isinstance(head, WireError):
+            results.append(head)
+            continue
+        begin, row = row, row + sum(map(len, head.blocks)) // 12
+        try:
+            results.append(_samples(batch, head, numbers[begin:row], sound))
+        except WireError as error:
+            results.append(error)
+    return results
+
+
+class _Head(NamedTuple):
+    """The shape of a batch, checked."""
+
+    samples: int
+    offsets: tuple[int, ...]
+    mag_index: tuple[int, ...] | None
+    blocks: tuple[bytes, ...]
+    """acc, gyr and mag, as far as they are there."""
+
+
+def _head(batch: SampleBatch) -> _Head | WireError:
+    try:
+        return _checked_head(batch)
+    except WireError as error:
+        return error
+
+
+def _checked_head(batch: SampleBatch) -> _Head:
+    if not (
+        0 <= batch.sequence < _FAR
+        and 0 < batch.time_ns < _FAR
+        and 0 <= batch.device_us < _FAR
+        and 0 <= batch.uncertainty_ns < _FAR
+        and 0 < batch.received_ns < _FAR
     ):
-        raise WireError(Drop.OUT_OF_RANGE, "imu/1: seq, t and dev must be positive and below 2^62")
-    if not 0 <= batch.uncertainty_ns < 1 << 62 or not 0 < batch.received_ns < 1 << 62:
-        raise WireError(Drop.OUT_OF_RANGE, "imu/1: rx and unc must be positive and below 2^62")
+        raise WireError(Drop.OUT_OF_RANGE, "imu/1: seq, t, dev, rx and unc must be positive and below 2^62")
     n, tail = divmod(len(batch.offsets), 4)
     if tail or not 1 <= n <= MAX_SAMPLES:
         raise WireError(
@@ -69,44 +121,32 @@ def read_samples(batch: SampleBatch) -> Samples:
     offsets = unpack(f"<{n}I", batch.offsets)
     if offsets[0] != 0 or offsets[-1] > MAX_SPAN_NS or not all(map(lt, offsets, offsets[1:])):
         raise WireError(Drop.TIME_BACKWARDS, "imu/1: dt must begin with 0 and grow from sample to sample")
-    if len(batch.device_offsets) != 4 * n:
-        raise WireError(
-            Drop.WRONG_SHAPE, f"imu/1: ddt holds {len(batch.device_offsets)} bytes; expected {4 * n}"
-        )
+    _sized(batch.device_offsets, 4 * n, "ddt")
     _together(batch)
     index = None if batch.mag_index is None else _mag_index(batch.mag_index, n)
-    mag_rows = n if index is None else len(index)
-    acc = gyr = mag = quat = None
+    blocks: tuple[bytes, ...] = ()
     if batch.acc is not None and batch.gyr is not None:
-        numbers = _numbers(batch.acc, 3 * n, "acc"), _numbers(batch.gyr, 3 * n, "gyr"), b""
+        blocks = (_sized(batch.acc, 12 * n, "acc"), _sized(batch.gyr, 12 * n, "gyr"))
         if batch.mag is not None:
-            numbers = *numbers[:2], _numbers(batch.mag, 3 * mag_rows, "mag")
-        block = np.frombuffer(b"".join(numbers), dtype="<f4").astype(np.float64).reshape(-1, 3)
-        acc, gyr = block[:n], block[n : 2 * n]
-        mag = block[2 * n :] if batch.mag is not None else None
-        # One look at all numbers settles nearly every batch: MAX_GYR is the smallest of the three limits.
-        if not np.maximum.reduce(np.abs(block), axis=None) <= MAX_GYR:  # NaN compares false
-            for rows, limit, name, unit in (
-                (acc, MAX_ACC, "acc", "m/s^2"),
-                (gyr, MAX_GYR, "gyr", "rad/s"),
-                (mag, MAX_MAG, "mag", "uT"),
-            ):
-                if rows is not None:
-                    _within(rows, limit, name, unit)
-    if batch.quat is not None:
-        quat = (
-            np.frombuffer(_numbers(batch.quat, 4 * n, "quat"), dtype="<f4").astype(np.float64).reshape(n, 4)
-        )
-    if quat is not None:
-        length = np.sqrt((quat * quat).sum(axis=1))
-        worst = float(np.abs(length - 1.0).max())
-        if not worst <= LENGTH_TOLERANCE:
-            drop = Drop.OUT_OF_RANGE if np.isfinite(worst) else Drop.NOT_FINITE
-            raise WireError(drop, f"imu/1: quat is not of length 1 (off by {worst:.2g})")
-        quat = quat / length[:, None]
+            blocks += (_sized(batch.mag, 12 * (n if index is None else len(index)), "mag"),)
+    return _Head(n, offsets, index, blocks)
+
+
+def _samples(batch: SampleBatch, head: _Head, numbers: Floats, sound: bool) -> Samples:
+    n = head.samples
+    acc = gyr = mag = None
+    if head.blocks:
+        acc, gyr = numbers[:n], numbers[n : 2 * n]
+        mag = numbers[2 * n :] if len(head.blocks) == 3 else None
+        if not sound:
+            _within(acc, MAX_ACC, "acc", "m/s^2")
+            _within(gyr, MAX_GYR, "gyr", "rad/s")
+            if mag is not None:
+                _within(mag, MAX_MAG, "mag", "uT")
+    start = batch.time_ns
     return Samples(
         sequence=batch.sequence,
-        time_ns=[batch.time_ns + offset for offset in offsets],
+        time_ns=[start + offset for offset in head.offsets],
         device_us=batch.device_us,
         device_offsets=batch.device_offsets,
         received_ns=batch.received_ns,
@@ -114,10 +154,21 @@ def read_samples(batch: SampleBatch) -> Samples:
         acc=acc,
         gyr=gyr,
         mag=mag,
-        mag_index=index,
-        quat=quat,
+        mag_index=head.mag_index,
+        quat=None if batch.quat is None else _orientations(batch.quat, n),
         late=batch.late,
     )
+
+
+def _orientations(block: bytes, n: int) -> Floats:
+    quat = np.frombuffer(_sized(block, 16 * n, "quat"), dtype="<f4").astype(np.float64).reshape(n, 4)
+    length = np.sqrt((quat * quat).sum(axis=1))
+    worst = float(np.abs(length - 1.0).max())
+    if not worst <= LENGTH_TOLERANCE:
+        drop = Drop.OUT_OF_RANGE if np.isfinite(worst) else Drop.NOT_FINITE
+        raise WireError(drop, f"imu/1: quat is not of length 1 (off by {worst:.2g})")
+    unit: Floats = quat / length[:, None]
+    return unit
 
 
 def write_samples(
@@ -172,12 +223,9 @@ def _together(batch: SampleBatch) -> None:
         raise WireError(Drop.WRONG_SHAPE, "imu/1: mag comes with acc and gyr only, mi with mag only")
 
 
-def _numbers(data: bytes, count: int, name: str) -> bytes:
-    if len(data) != 4 * count:
-        raise WireError(
-            Drop.WRONG_SHAPE,
-            f"imu/1: {name} holds {len(data)} bytes; expected {count} f32, {4 * count} bytes",
-        )
+def _sized(data: bytes, size: int, name: str) -> bytes:
+    if len(data) != size:
+        raise WireError(Drop.WRONG_SHAPE, f"imu/1: {name} holds {len(data)} bytes; expected {size}")
     return data
 
 
