@@ -1,9 +1,9 @@
 """When was it, in host time? One node's clock against the host's, from messages that took unknown times.
 
 Every arrival of device time x at host time h says that the offset h - x is at most that large, every question
-sent at h that the node had at x that it is at least that large. The line that keeps below the ones and above the
-others with the smallest sum of gaps (Moon, Skelly and Towsley, INFOCOM 1999, both directions with one slope) is
-the node's clock.
+sent at h that the node had at x that it is at least that large. The line that keeps below the ones and above
+the others with the smallest sum of gaps (Moon, Skelly and Towsley, INFOCOM 1999, here for both directions
+with one slope) is the node's clock.
 """
 
 from collections import deque
@@ -82,8 +82,8 @@ class NodeClock:
         self._refit(device_us, host_ns)
 
     def exchange(self, asked_ns: int, came_us: int, left_us: int, answered_ns: int) -> bool:
-        """Take a question sent at `asked_ns` and answered at `answered_ns` (host times) that the node had from
-        `came_us` to `left_us` (its own). Returns False when these cannot be: nothing is taken then.
+        """Take a question sent at `asked_ns` and answered at `answered_ns` (host) that the node had from
+        `came_us` to `left_us` (its own clock). Returns False when these cannot be: nothing is taken then.
         """
         round_trip = (answered_ns - asked_ns) - (left_us - came_us) * 1000
         backwards = bool(self._downs) and came_us < self._downs[-1][0]
@@ -180,19 +180,24 @@ def between(ups: Floats, downs: Floats) -> tuple[float, float, float]:
     """Return intercept, slope and gap of the middle line between points above (n, 2) and points below (m, 2).
 
     For a slope b the upper line touches at min(y - b x), the lower at max(y - b x); the sum of all gaps, each
-    side weighted alike, is convex in b and its best slope is found by narrowing a grid. The gap is negative when
-    no line keeps them apart.
+    side weighted alike, is convex in b and its best slope is found by narrowing a grid. The gap is negative
+    when no line keeps them apart.
     """
     middle = float(np.mean(ups[:, 0]))
     x_up, y_up = ups[:, 0] - middle, ups[:, 1]
     x_down, y_down = downs[:, 0] - middle, downs[:, 1]
+
+    def touching(slopes: Floats) -> tuple[Floats, Floats]:
+        upper = np.min(y_up - slopes[:, None] * x_up, axis=1)
+        return upper, np.max(y_down - slopes[:, None] * x_down, axis=1)
+
     lean = -float(np.mean(x_down))
     low, high = -MAX_SLOPE, MAX_SLOPE
     for _ in range(6):
         slopes = np.linspace(low, high, 17)
-        upper = np.min(y_up - slopes[:, None] * x_up, axis=1)
-        lower = np.max(y_down - slopes[:, None] * x_down, axis=1)
+        upper, lower = touching(slopes)
         best = int(np.argmax(upper - lower + slopes * lean))
-        low, high = slopes[max(best - 1, 0)], slopes[min(best + 1, 16)]
-    slope = float(slopes[best])
-    return float(upper[best] + lower[best]) / 2 - slope * middle, slope, float(upper[best] - lower[best])
+        low, high = float(slopes[max(best - 1, 0)]), float(slopes[min(best + 1, 16)])
+    slope = (low + high) / 2
+    above, below = (float(line[0]) for line in touching(np.array([slope])))
+    return (above + below) / 2 - slope * middle, slope, above - below

@@ -68,7 +68,7 @@ def run(settings: GatewaySettings, stop: threading.Event) -> None:
 
 
 class Gateway:
-    """Joins connections, roster and bus. All runs on one event loop; only `_assign` is called from outside."""
+    """Joins connections, roster and bus. All runs on one event loop but `_assign`."""
 
     def __init__(self, bus: Bus, settings: GatewaySettings, roster: Roster) -> None:
         self._bus, self._settings, self._roster = bus, settings, roster
@@ -104,7 +104,7 @@ class Gateway:
             port = listening.sockets[0].getsockname()[1]
             self._heart = Heart(self._bus, settings.room, "gateway", settings.id)
             self._heart.text = f"ws://{f'[{address}]' if ':' in address else address}:{port}{PATH}"
-            tell_host_time(self._bus, settings.room, settings.id, self._clock)
+            tell_host_time(self._bus, settings.room, settings.id, self._clock.now_ns)
             loop = asyncio.get_running_loop()
             self._bus.serve(keys.commands(settings.room, "assign"), lambda k, q: self._assign(loop, k, q))
             log.info("gateway %s takes nodes at %s", settings.id, self._heart.text)

@@ -1,4 +1,4 @@
-"""A node's side of the WebSocket: says hello, answers clock questions, sends frames, leaves with its count."""
+"""A node's side of the WebSocket: hello, answers to clock questions, frames, and a bye with its count."""
 
 import asyncio
 from collections.abc import Callable
@@ -48,8 +48,25 @@ class NodeClient:
 
     async def join(self) -> Welcome:
         """Connect and be let in. Raises NoGateway or NotWelcome."""
+        socket = await self._connect()
         try:
-            self._socket = await connect(
+            await socket.send(encode(self._hello))
+            answer = from_gateway(await socket.recv())
+        except (ConnectionClosed, WireError) as error:
+            await socket.close()
+            raise NoGateway(f"{self._url} ended the conversation: {error}") from None
+        if not isinstance(answer, Welcome):
+            await socket.close()
+            if isinstance(answer, Refused):
+                raise NotWelcome(answer.code, answer.reason, answer.retry_s)
+            raise NoGateway(f"{self._url} answered a hello with {type(answer).__name__}")
+        self._socket, self.refused = socket, None
+        self._reader = asyncio.create_task(self._listen(socket))
+        return answer
+
+    async def _connect(self) -> ClientConnection:
+        try:
+            return await connect(
                 self._url,
                 additional_headers={"Authorization": f"Bearer {self._token}"},
                 compression=None,
@@ -65,26 +82,11 @@ class NodeClient:
                 text = f"{self._url} does not know the token of node {self._hello.node}"
                 raise NotWelcome("wrong_token", text, None) from None
             raise NoGateway(f"{self._url} answers {error.response.status_code}; is it a gateway?") from None
+        except InvalidURI:
+            reason = f"{self._url!r} is no address of a gateway; write it as ws://127.0.0.1:8765/node"
+            raise NotWelcome("bad_hello", reason, None) from None
         except (OSError, InvalidHandshake, TimeoutError) as error:
-            raise NoGateway(
-                f"no gateway at {self._url} ({error}); start one with: brachium gateway"
-            ) from None
-        except InvalidURI as error:
-            raise NoGateway(f"{error}; write it as ws://127.0.0.1:8765/node") from None
-        try:
-            await self._socket.send(encode(self._hello))
-            answer = from_gateway(await self._socket.recv())
-        except (ConnectionClosed, WireError) as error:
-            await self._socket.close()
-            raise NoGateway(f"{self._url} ended the conversation: {error}") from None
-        if isinstance(answer, Refused):
-            await self._socket.close()
-            raise NotWelcome(answer.code, answer.reason, answer.retry_s)
-        if not isinstance(answer, Welcome):
-            await self._socket.close()
-            raise NoGateway(f"{self._url} answered a hello with {type(answer).__name__}")
-        self._reader = asyncio.create_task(self._listen(self._socket))
-        return answer
+            raise NoGateway(f"no gateway at {self._url} ({error}); start one: brachium gateway") from None
 
     async def send(self, frame: Batch | NodeStatus) -> None:
         """Send a frame. Raises ConnectionError when the connection is gone."""
@@ -99,7 +101,9 @@ class NodeClient:
             raise ConnectionError(str(error)) from None
 
     async def leave(self, next_sequence: int) -> None:
-        """Say bye and wait until the gateway has counted and closed."""
+        """Say bye and wait until the gateway has counted and closed; nothing when not joined."""
+        if self._socket is None:
+            return
         try:
             await self.send_bytes(encode(Bye(next_sequence=next_sequence)))
             async with asyncio.timeout(LEAVE_WITHIN_S):

@@ -1,0 +1,250 @@
+"""The emulated wearer in real time: each segment a node of its own, and the truth beside it."""
+
+import asyncio
+import logging
+import secrets
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from math import ceil, inf
+from threading import Event
+
+import numpy as np
+
+from brachium_body.continuation import AngleTracker
+from brachium_body.segments import Side
+from brachium_nodes.direct_node import DirectHost, DirectSink
+from brachium_nodes.gateway import token_sha256
+from brachium_nodes.host_claim import checked_host
+from brachium_nodes.link import EmulatedClock, FaultSettings
+from brachium_nodes.node_frames import Batch, Hello
+from brachium_nodes.node_stream import (
+    NodeStream,
+    Outgoing,
+    Sink,
+    SocketSink,
+    StreamCount,
+    Timeline,
+    send_streams,
+)
+from brachium_nodes.roster import NodeEntry
+from brachium_nodes.wearer import Packet, Wearer, WearerSettings
+from brachium_wire import keys
+from brachium_wire.bus import DEFAULT_ENDPOINT, Bus
+from brachium_wire.codec import encode
+from brachium_wire.heart import Heart
+from brachium_wire.hosttime import follow_host_time
+from brachium_wire.messages import Session
+
+log = logging.getLogger(__name__)
+
+TRUTH_NS = 20_000_000
+LARGEST_BATCH = 96
+"""Samples of 40 bytes that fit in a frame."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class EmulateSettings:
+    """Emulated wearers and the way in for their nodes."""
+
+    endpoint: str = DEFAULT_ENDPOINT
+    room: str = "lab"
+    id: str = "emulate"
+    """Names the service; with `direct` also the host."""
+    gateway: str = "ws://127.0.0.1:8765/node"
+    token: str = ""
+    """The nodes' token at the gateway."""
+    direct: bool = False
+    """Publish without a gateway."""
+    speed: float = 1.0
+    """Only with `direct`: a gateway keeps real time."""
+    seconds: float | None = None
+    subject: str = "p01"
+    wearers: int = 1
+    """More than one: subjects p001, p002, ..., each with the next seed."""
+    wearer: WearerSettings = field(default_factory=WearerSettings)
+    faults: FaultSettings = field(default_factory=FaultSettings)
+    truth: bool = True
+    session: bool = True
+
+    def __post_init__(self) -> None:
+        """Raise ValueError for what cannot be emulated."""
+        if self.speed <= 0.0 or (self.speed != 1.0 and not self.direct):
+            raise ValueError(f"speed {self.speed} cannot be used; give a positive one, and direct if not 1")
+        if not self.direct and not self.token:
+            raise ValueError("nodes need a token to join a gateway; give one, or publish directly")
+        if self.wearers < 1:
+            raise ValueError(f"{self.wearers} wearers cannot be; give 1 or more")
+        if self.wearer.batch > LARGEST_BATCH:
+            raise ValueError(
+                f"batches of {self.wearer.batch} fit no frame; give 1 to {LARGEST_BATCH} samples"
+            )
+        checked_host(self.id)
+
+    def subjects(self) -> tuple[str, ...]:
+        """Return the subjects' names."""
+        if self.wearers == 1:
+            return (keys.subject_chunk(self.subject),)
+        return tuple(f"p{number:03d}" for number in range(1, self.wearers + 1))
+
+
+@dataclass(frozen=True, kw_only=True)
+class EmulateReport:
+    """What was sent and what was done to it, by subject and segment."""
+
+    streams: dict[str, dict[str, StreamCount]]
+
+
+def node_id(subject: str, segment: str) -> str:
+    """Return the id under which an emulated segment joins."""
+    return f"emu-{subject}-{segment}"
+
+
+def node_entries(settings: EmulateSettings) -> tuple[NodeEntry, ...]:
+    """Return what a gateway's table needs so that these wearers' nodes are let in."""
+    wearer = Wearer(settings.wearer)
+    return tuple(
+        NodeEntry(
+            id=node_id(subject, segment),
+            token_sha256=token_sha256(settings.token),
+            subject=subject,
+            segment=segment,
+            mounting=wearer.info(segment).mounting,
+        )
+        for subject in settings.subjects()
+        for segment in wearer.segments
+    )
+
+
+def run(settings: EmulateSettings, stop: Event) -> EmulateReport:
+    """Emulate until `seconds` are over or `stop` is set; return what was sent.
+
+    Raises NotWelcome when the gateway will not have these nodes, and NoRouter.
+    """
+    with Bus.open(settings.endpoint, stop=stop) as bus:
+        return asyncio.run(_Emulation(settings, bus, stop).run())
+
+
+class _Emulation:
+    def __init__(self, settings: EmulateSettings, bus: Bus, stop: Event) -> None:
+        self._settings, self._bus, self._stop = settings, bus, stop
+        self._timeline = Timeline(settings.speed)
+        self._wearers = {
+            subject: Wearer(replace(settings.wearer, seed=settings.wearer.seed + number))
+            for number, subject in enumerate(settings.subjects())
+        }
+        self._direct: DirectHost | None = None
+        self._trackers = {
+            (name, side): AngleTracker() for name, w in self._wearers.items() for side in sides(w)
+        }
+        self._heart = Heart(bus, settings.room, "emulate", settings.id)
+        self._nodes: list[tuple[NodeStream, Sink]] = []
+
+    async def run(self) -> EmulateReport:
+        settings = self._settings
+        if settings.direct:
+            self._direct = DirectHost(self._bus, settings.room, settings.id, self._timeline)
+        for subject, wearer in self._wearers.items():
+            streams = node_streams(subject, wearer, settings.faults)
+            self._nodes += [(stream, self._sink(stream)) for stream in streams]
+            if settings.session:
+                self._bus.retain(keys.session(settings.room, subject), encode(session(wearer)))
+        end_s = inf if settings.seconds is None else settings.seconds
+        counts = await send_streams(self._nodes, self._timeline, end_s, self._stop, self._beside)
+        report: dict[str, dict[str, StreamCount]] = {}
+        for (subject, segment), count in counts.items():
+            report.setdefault(subject, {})[segment] = count
+            self._heart.counts["samples"] += count.sent
+        self._heart.beat(now=True)
+        return EmulateReport(streams=report)
+
+    def _sink(self, stream: NodeStream) -> Sink:
+        if self._direct is not None:
+            return DirectSink(self._direct, stream)
+        return SocketSink(self._settings.gateway, self._settings.token, stream, self._timeline)
+
+    async def _beside(self) -> None:
+        """Publish truth and health while the nodes send."""
+        origin_ns = await asyncio.to_thread(self._origin_ns)
+        tick = ceil(origin_ns / TRUTH_NS)
+        while True:
+            self._heart.beat()
+            due_s = (tick * TRUTH_NS - origin_ns) * 1e-9
+            if not await self._timeline.reach(due_s, self._stop):
+                return
+            if self._settings.truth:
+                self._truth(tick, origin_ns)
+            tick += 1
+
+    def _truth(self, tick: int, origin_ns: int) -> None:
+        time_s = np.array([(tick * TRUTH_NS - origin_ns) / 1e9])
+        for subject, wearer in self._wearers.items():
+            for side in sides(wearer):
+                for skeleton in wearer.skeletons(time_s, side, origin_ns, self._trackers[subject, side]):
+                    self._bus.put(keys.truth(self._settings.room, subject, side), encode(skeleton))
+
+    def _origin_ns(self) -> int:
+        """Return host time at true time 0: the gateway's, for samples get theirs from it."""
+        if self._direct is not None:
+            return self._direct.origin_ns
+        host = next(sink.host for _, sink in self._nodes if isinstance(sink, SocketSink) and sink.host)
+        return follow_host_time(self._bus, self._settings.room, host).at(self._timeline.start_ns)
+
+
+def sides(wearer: Wearer) -> tuple[Side, ...]:
+    """Return the arms that exercise."""
+    arms = wearer.settings.arms
+    return ("right", "left") if arms == "both" else (arms,)
+
+
+def session(wearer: Wearer) -> Session:
+    """Return what a subject's session says of an emulated wearer."""
+    person = wearer.settings
+    return Session(side=person.arms, height_m=person.height_m, facing_deg=0.0, exercise=person.exercise)
+
+
+def node_streams(subject: str, wearer: Wearer, faults: FaultSettings) -> list[NodeStream]:
+    """Return the nodes of one wearer, as just switched on."""
+    streams = []
+    for segment in wearer.segments:
+        info, clock = wearer.info(segment), wearer.clocks[segment]
+        hello = Hello(
+            node=node_id(subject, segment),
+            boot=secrets.randbits(32),
+            chip=info.chip,
+            rate_hz=info.rate_hz,
+            firmware="emulated",
+            magnetometer=info.magnetometer,
+            calibration=info.calibration,
+            origin="emulated",
+        )
+        streams.append(
+            NodeStream(
+                subject=subject,
+                segment=segment,
+                hello=hello,
+                mounting=info.mounting,
+                packets=map(outgoing, wearer.packets(segment, faults)),
+                clock_us=_reader(clock),
+            )
+        )
+    return streams
+
+
+def _reader(clock: EmulatedClock) -> Callable[[float], int]:
+    return lambda time_s: int(clock.ticks_us(np.array([time_s]))[0])
+
+
+def outgoing(packet: Packet) -> Outgoing:
+    """Return a packet of the emulated wearer as the frame that its node sends."""
+    readings, ticks = packet.readings, packet.device_us
+    whole = len(readings.mag) == len(ticks)
+    batch = Batch(
+        sequence=packet.sequence,
+        device_us=int(ticks[0]),
+        offsets=(ticks - ticks[0]).astype("<u4").tobytes(),
+        acc=readings.acc.astype("<f4").tobytes(),
+        gyr=readings.gyr.astype("<f4").tobytes(),
+        mag=readings.mag.astype("<f4").tobytes() if len(readings.mag) else None,
+        mag_index=None if whole or not len(readings.mag) else readings.mag_index.astype("<u2").tobytes(),
+    )
+    return Outgoing(packet.send_time_s, batch, readings.time_s)
