@@ -73,17 +73,15 @@ def test_info_stays_ahead_of_the_first_batch(connect: Connect, until: Until) -> 
         )
 
 
-def test_a_late_joiner_fetches_the_last_value_of_each_key(connect: Connect) -> None:
+def test_a_late_joiner_fetches_the_last_value_of_each_key(connect: Connect, until: Until) -> None:
     publisher = connect()
     for value in (b"1", b"2", b"3"):
         publisher.retain(SESSION, value)
     publisher.retain(keys.session("gym", "p02"), b"other")
     publisher.retain(keys.session("hall", "p01"), b"another room")
     reader = connect()
-    assert sorted(reader.fetch(keys.subjects("gym", "session"))) == [
-        (SESSION, b"3"),
-        (keys.session("gym", "p02"), b"other"),
-    ]
+    expected = [(SESSION, b"3"), (keys.session("gym", "p02"), b"other")]
+    until(lambda: sorted(reader.fetch(keys.subjects("gym", "session"))) == expected, "both last values")
     assert reader.fetch(keys.subjects("gym", "calibration")) == []
 
 
@@ -92,6 +90,7 @@ def test_subscribe_then_fetch_ends_with_the_last_value_whenever_it_joins(
 ) -> None:
     publisher, reader = connect(), connect()
     publisher.retain(SESSION, b"0")
+    until(lambda: reader.fetch(SESSION) == [(SESSION, b"0")], "the first value")
     done = threading.Event()
 
     def change() -> None:
@@ -202,16 +201,16 @@ def test_many_threads_put_first_on_the_same_keys(connect: Connect, until: Until)
     assert all(got.count(keys.event("gym", f"s{number}")) == 8 for number in range(20))
 
 
-def test_a_question_is_answered(connect: Connect) -> None:
+def test_a_question_is_answered(connect: Connect, until: Until) -> None:
     server, asker = connect(), connect()
     server.serve(keys.commands("gym", "zero"), lambda key, question: f"{key} ".encode() + question)
     key = keys.command("gym", "p01", "zero")
-    assert asker.ask(key, b"now") == f"{key} now".encode()
+    until(lambda: asker.ask(key, b"now") == f"{key} now".encode(), "the answer")
     assert asker.ask(key) == f"{key} ".encode()
     assert asker.ask(keys.command("gym", "p01", "record")) is None
 
 
-def test_an_answer_may_come_later_from_another_thread(connect: Connect) -> None:
+def test_an_answer_may_come_later_from_another_thread(connect: Connect, until: Until) -> None:
     server, asker = connect(), connect()
     pending: list[threading.Timer] = []
 
@@ -220,12 +219,14 @@ def test_an_answer_may_come_later_from_another_thread(connect: Connect) -> None:
         pending[-1].start()
 
     server.serve_later(keys.commands("gym", "calibrate"), asked)
-    assert asker.ask(keys.command("gym", "p01", "calibrate"), b"x", timeout_s=10.0) == b"later x"
-    pending[0].join()
+    key = keys.command("gym", "p01", "calibrate")
+    until(lambda: asker.ask(key, b"x", timeout_s=10.0) == b"later x", "the answer")
+    for timer in pending:
+        timer.join()
 
 
 def test_a_handler_that_fails_answers_so_and_goes_on(
-    connect: Connect, caplog: pytest.LogCaptureFixture
+    connect: Connect, until: Until, caplog: pytest.LogCaptureFixture
 ) -> None:
     server, asker = connect(), connect()
 
@@ -237,6 +238,7 @@ def test_a_handler_that_fails_answers_so_and_goes_on(
     server.serve(keys.commands("gym", "zero"), answer)
     key = keys.command("gym", "p01", "zero")
     with caplog.at_level(logging.CRITICAL, "brachium_wire.bus"):
+        until(lambda: asker.ask(key, b"bad"), "an answer all the same")
         said = asker.ask(key, b"bad")
     assert said is not None
     refusal = decode(said, Answer)
@@ -245,12 +247,15 @@ def test_a_handler_that_fails_answers_so_and_goes_on(
     assert asker.ask(key, b"good") == b"good"
 
 
-def test_looking_for_retained_values_never_runs_a_command(connect: Connect) -> None:
+def test_looking_for_retained_values_never_runs_a_command(connect: Connect, until: Until) -> None:
     server, asker = connect(), connect()
     asked: list[str] = []
     server.serve(keys.commands("gym", "calibrate"), lambda key, _: (asked.append(key), b"ok")[1])
     server.retain(SESSION, b"value")
-    assert asker.fetch(keys.everything("gym")) == [(SESSION, b"value")]
+    probe = keys.command("gym", "p01", "calibrate")
+    until(lambda: asker.ask(probe) == b"ok", "the command is served")
+    asked.clear()
+    until(lambda: asker.fetch(keys.everything("gym")) == [(SESSION, b"value")], "the retained value")
     assert asker.fetch(keys.subjects("gym", "command/calibrate")) == []
     with pytest.raises(keys.BadKey):
         asker.ask("brachium/gym/*/command/calibrate")

@@ -37,10 +37,13 @@ def test_a_reading_of_the_monotonic_clock_has_its_host_time(monkeypatch: pytest.
 
 
 @pytest.mark.network
-def test_another_process_follows_within_the_uncertainty_it_states(connect: Callable[[], Bus]) -> None:
+def test_another_process_follows_within_the_uncertainty_it_states(
+    connect: Callable[[], Bus], until: Callable[[Callable[[], object], str], None]
+) -> None:
     teller, asker = connect(), connect()
     far = HostClock(start_ns=123_456_789_000_000_000)
     tell_host_time(teller, "gym", "g1", far.now_ns)
+    until(lambda: asker.ask(keys.host_time("gym", "g1")), "an answer")
     clock = follow_host_time(asker, "gym", "g1")
     moment = time.monotonic_ns()
     assert abs(clock.at(moment) - far.at(moment)) <= clock.uncertainty_ns < 2_000_000_000
@@ -52,9 +55,12 @@ def test_another_process_follows_within_the_uncertainty_it_states(connect: Calla
     "answer",
     [b"", b"\xc1", b"x" * 1000, msgpack.packb({"t": "now"}), msgpack.packb({"t": -1}), msgpack.packb([1])],
 )
-def test_a_foolish_answer_is_no_time(connect: Callable[[], Bus], answer: bytes) -> None:
+def test_a_foolish_answer_is_no_time(
+    connect: Callable[[], Bus], until: Callable[[Callable[[], object], str], None], answer: bytes
+) -> None:
     teller, asker = connect(), connect()
     teller.serve(keys.host_time("gym", "g1"), lambda _key, _question: answer)
+    until(lambda: asker.ask(keys.host_time("gym", "g1")) == answer, "the answer itself")
     with pytest.raises(NoHostTime, match="is that gateway running"):
         follow_host_time(asker, "gym", "g1")
 

@@ -70,7 +70,7 @@ def test_the_client_imports_nothing_of_ours() -> None:
 
 
 def test_it_finds_retained_infos_and_prints_skeletons_and_samples(
-    connect: Callable[[], Bus], start: Start, router: Any
+    connect: Callable[[], Bus], start: Start, router: Any, until: Callable[[Callable[[], object], str], None]
 ) -> None:
     import zenoh
 
@@ -84,6 +84,8 @@ def test_it_finds_retained_infos_and_prints_skeletons_and_samples(
         calibration=SensorCalibration(gyro_bias=(0.25, 0.0, -0.5)),
     )
     bus.retain(keys.info("gym", "p01", "forearm_r"), encode(info))
+    reader = connect()
+    until(lambda: reader.fetch(keys.info("gym", "p01", "forearm_r")), "the retained info")
     process = start(3)
     assert until_ready(process) == [
         "info p01 forearm_r esp-1 100 Hz emulated mounting 0.5 0.5 -0.5 0.5 bias 0.25 0 -0.5"
