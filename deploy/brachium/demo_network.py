@@ -9,6 +9,7 @@ from pathlib import Path
 from brachium.checks import free_port
 from brachium.processes import Processes
 from brachium.shell import Failed
+from brachium.way_in import node_table
 from brachium_nodes.emulate import EmulateReport, EmulateSettings, node_entries
 from brachium_wire import keys
 from brachium_wire.bus import Bus, Inbox
@@ -123,7 +124,9 @@ class DemoNetwork:
         if self.processes.end("record") != 0:
             raise Failed(f"the recorder failed: {last_line(self._log('record', 'err'))}")
         made = Path(json.loads(self._log("record", "out").read_text("utf-8"))["path"])
-        return made.rename(self.folder / "recording.mcap")
+        moved = made.rename(self.folder / "recording.mcap")
+        made.parent.rmdir()
+        return moved
 
     def _log(self, name: str, kind: str) -> Path:
         return self.folder / "logs" / f"{name}.{kind}"
@@ -131,13 +134,12 @@ class DemoNetwork:
 
 def site_text(wearer: EmulateSettings) -> str:
     """Return the site file that lets this wearer's nodes in."""
-    from brachium.commands.emulate import node_table
-
-    subjects = sorted({entry.subject for entry in node_entries(wearer) if entry.subject})
+    entries = node_entries(wearer)
+    subjects = sorted({entry.subject for entry in entries if entry.subject})
     lines = ["[room]", f'id = "{ROOM}"', ""]
     for subject in subjects:
         lines += ["[[subject]]", f'id = "{subject}"', ""]
-    return "\n".join([*lines, *node_table(wearer)])
+    return "\n".join([*lines, node_table(entries)])
 
 
 def last_line(path: Path) -> str:

@@ -1,7 +1,7 @@
 import os
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
@@ -13,14 +13,16 @@ ROOT = Path(__file__).parents[2]
 PARTS = ("body", "wire", "nodes", "router", "fusion", "viewer", "deploy")
 
 
-@pytest.fixture(autouse=True)
-def _children_see_the_source(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.fixture(autouse=True, scope="session")
+def _children_see_the_source() -> Iterator[None]:
     """Child processes import what this one imports: the tree, or the wheel when the tree is not there."""
     folders = [str(ROOT / part) for part in PARTS if (ROOT / part).is_dir()]
-    if folders:
-        monkeypatch.setenv("PYTHONPATH", os.pathsep.join(folders))
-    else:
-        monkeypatch.delenv("PYTHONPATH", raising=False)
+    with pytest.MonkeyPatch.context() as patch:
+        if folders:
+            patch.setenv("PYTHONPATH", os.pathsep.join(folders))
+        else:
+            patch.delenv("PYTHONPATH", raising=False)
+        yield
 
 
 def brachium(*words: str, timeout_s: float = 60.0) -> subprocess.CompletedProcess[str]:
@@ -34,8 +36,8 @@ def brachium(*words: str, timeout_s: float = 60.0) -> subprocess.CompletedProces
     )
 
 
-@pytest.fixture(name="brachium")
-def _brachium():
+@pytest.fixture(name="brachium", scope="session")
+def _brachium() -> Callable[..., subprocess.CompletedProcess[str]]:
     return brachium
 
 

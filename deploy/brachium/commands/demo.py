@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from brachium.shell import Failed, Usage, add_json, as_json, print_json, stop_on_signals
+from brachium.way_in import TOKEN_VARIABLE
 
 if TYPE_CHECKING:
     from brachium.demo_report import DemoReport
@@ -71,7 +72,7 @@ def _demo(args: argparse.Namespace, folder: Path, begun: float) -> "DemoReport":
     stop, words, first_s = stop_on_signals(), _wearer_words(args), None
     token = secrets.token_urlsafe(16)
     wearer = settings_of(words, token)  # before anything starts: bad input is said at once
-    with Processes(environment={"BRACHIUM_TOKEN": token}) as processes:
+    with Processes(environment={TOKEN_VARIABLE: token}) as processes:
         network = DemoNetwork(folder=folder, processes=processes)
         network.start(wearer, view=not args.headless)
         with Bus.open(network.endpoint, stop=stop) as bus:

@@ -1,38 +1,26 @@
 """Emulate a wearer: its sensors, through the gateway or straight to the bus, and the truth beside them.
 
-brachium emulate --direct --exercise drinking --level typical --seconds 60
+brachium emulate --exercise drinking --level typical --seconds 60
   brachium emulate --print-nodes --token-file token.txt >> site.toml
 """
 
 import argparse
-import os
-from pathlib import Path
 from typing import TYPE_CHECKING
 
-from brachium.shell import Usage, add_json, add_network, print_json, stop_on_signals
+from brachium.shell import add_json, add_network, print_json, stop_on_signals
+from brachium.way_in import GATEWAY, add_way_in, node_table, read_token
 
 if TYPE_CHECKING:
     from brachium_nodes.emulate import EmulateSettings
-
-TOKEN_VARIABLE = "BRACHIUM_TOKEN"
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
     """Add the wearer's options."""
     add_network(parser)
+    add_way_in(parser)
     add_json(parser)
-    parser.add_argument(
-        "--gateway", default="ws://127.0.0.1:8765/node", metavar="URL", help="where it listens"
-    )
-    parser.add_argument(
-        "--token-file", type=Path, metavar="FILE", help=f"the nodes' token (or ${TOKEN_VARIABLE})"
-    )
-    parser.add_argument("--direct", action="store_true", help="publish without a gateway")
-    parser.add_argument("--speed", type=float, default=1.0, help="times real time; only with --direct")
-    parser.add_argument("--seconds", type=float, help="how long (default: until Ctrl-C)")
     parser.add_argument("--subject", default="p01", help="the subject's name")
     parser.add_argument("--wearers", type=int, default=1, help="more than one: p001, p002, ...")
-    parser.add_argument("--print-nodes", action="store_true", help="print the nodes for a site file, and end")
     add_wearer(parser)
     add_faults(parser)
 
@@ -60,9 +48,9 @@ def run(args: argparse.Namespace) -> int:
     """Emulate, then tell what was sent."""
     from brachium_nodes import emulate
 
-    chosen = settings(args, _token(args))
+    chosen = settings(args, read_token(args))
     if args.print_nodes:
-        print("\n".join(node_table(chosen)))
+        print(node_table(emulate.node_entries(chosen)))
         return 0
     report = emulate.run(chosen, stop_on_signals())
     if args.json:
@@ -83,9 +71,9 @@ def settings(args: argparse.Namespace, token: str) -> "EmulateSettings":
     return EmulateSettings(
         endpoint=args.endpoint,
         room=args.room,
-        gateway=args.gateway,
+        gateway=args.gateway or GATEWAY,
         token=token,
-        direct=args.direct,
+        direct=args.gateway is None and not args.print_nodes,
         speed=args.speed,
         seconds=args.seconds,
         subject=args.subject,
@@ -108,28 +96,3 @@ def settings_of(words: list[str], token: str) -> "EmulateSettings":
     parser = argparse.ArgumentParser()
     configure(parser)
     return settings(parser.parse_args(words), token)
-
-
-def node_table(chosen: "EmulateSettings") -> list[str]:
-    """Return the lines of a site file that let these wearers' nodes in."""
-    from brachium_nodes.emulate import node_entries
-
-    lines = []
-    for entry in node_entries(chosen):
-        lines += ["[[node]]", f'id = "{entry.id}"', f'token_sha256 = "{entry.token_sha256}"']
-        lines += [f'subject = "{entry.subject}"', f'segment = "{entry.segment}"']
-        if entry.mounting is not None:
-            lines.append(f"mounting = {[float(part) for part in entry.mounting]}")
-        lines.append("")
-    return lines
-
-
-def _token(args: argparse.Namespace) -> str:
-    if args.token_file is not None:
-        return str(args.token_file.read_text("utf-8")).strip()
-    token = os.environ.get(TOKEN_VARIABLE, "")
-    if not token and not args.direct:
-        raise Usage(
-            f"nodes need a token to join a gateway: give --token-file or ${TOKEN_VARIABLE}, or --direct"
-        )
-    return token
