@@ -90,12 +90,17 @@ class SegmentTrack:
         if samples.late:
             drops[Drop.LATE.value] += n
             return False
-        gap = self.counter.feed(samples.sequence, n)
-        if gap < 0:
-            drops[Drop.OUT_OF_ORDER.value] += n
-            return False
-        if samples.time_ns[0] <= self.last_ns:
+        counter = self.counter
+        if samples.time_ns[0] <= self.last_ns and samples.sequence >= (counter.next or 0):
+            # Before it is counted: a batch that is refused must not move the number that is expected.
             drops[Drop.TIME_BACKWARDS.value] += n
+            return False
+        repeated = counter.repeated
+        gap = counter.feed(samples.sequence, n)
+        if gap < 0:
+            again = counter.repeated - repeated
+            drops.update({Drop.REPEATED.value: again} if again else {})
+            drops.update({Drop.OUT_OF_ORDER.value: n - again} if n > again else {})
             return False
         if samples.quat is not None:
             self._feed_orientation(samples)
@@ -239,6 +244,7 @@ class SegmentTrack:
         counter = self.counter
         return {
             "counter": [counter.received, counter.lost, counter.out_of_order, counter.repeated, counter.next],
+            "gaps": [list(gap) for gap in counter.gaps],
             "last_ns": self.last_ns,
             "still_since_ns": self.still_since_ns,
             "batch_ns": self.batch_ns,
@@ -255,7 +261,7 @@ class SegmentTrack:
 
     def restore(self, state: dict[str, Any]) -> None:
         """Go on as the track whose state this is would have."""
-        self.counter = SequenceCounter(*state["counter"])
+        self.counter = SequenceCounter(*state["counter"], gaps=[(first, end) for first, end in state["gaps"]])
         self.last_ns, self.still_since_ns = state["last_ns"], state["still_since_ns"]
         self.batch_ns, self.restarts = state["batch_ns"], state["restarts"]
         self._filter.restore(state["filter"])
