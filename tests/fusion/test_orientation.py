@@ -145,7 +145,7 @@ def test_a_disturbance_is_found_only_after_the_field_was_learnt_and_is_kept_in_t
     assert not filter_.disturbed
     filter_.update(gyr[50:-100], acc[50:-100], mag[50:-100], None)
     assert not filter_.disturbed
-    filter_.update(gyr[-100:], acc[-100:], mag[-100:] + [60.0, 0.0, 0.0], None)
+    filter_.update(gyr[-100:], acc[-100:], mag[-100:] + np.array([60.0, 0.0, 0.0]), None)
     assert filter_.disturbed
     assert put_back(filter_, make("vqf", 1.0 / RATE, True)).disturbed
 
