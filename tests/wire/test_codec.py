@@ -2,7 +2,7 @@
 
 import contextlib
 import struct
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import msgpack
@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from brachium_wire import messages
-from brachium_wire.codec import MAX_DEPTH, Drop, WireError, decode, decode_topic, encode
+from brachium_wire.codec import MAX_DEPTH, Drop, WireError, decode, decode_batch, decode_topic, encode
 from brachium_wire.messages import Message
 from brachium_wire.samples import read_samples
 from brachium_wire.topics import TOPICS
@@ -338,3 +338,50 @@ def test_the_right_map_with_one_strange_field_gives_a_message_or_a_refusal(
     except WireError:
         return
     assert decode(encode(message), kind) == message
+
+
+def outcome(read: Callable[[bytes], Message], payload: bytes) -> Message | Drop:
+    try:
+        return read(payload)
+    except WireError as error:
+        return error.drop
+
+
+@given(
+    st.binary(max_size=200)
+    | st.builds(
+        lambda field, junk: msgpack.packb({**GOOD[messages.SampleBatch], field: junk}),
+        st.sampled_from([f.encode_name for f in msgspec.structs.fields(messages.SampleBatch)] + ["m", "new"]),
+        JUNK,
+    )
+    | st.builds(
+        lambda at, byte: (lambda b: b[:at] + bytes([byte]) + b[at + 1 :])(
+            msgpack.packb(GOOD[messages.SampleBatch])
+        ),
+        st.integers(0, 120),
+        st.integers(0, 255),
+    )
+)
+def test_the_quick_way_for_batches_gives_what_the_thorough_one_gives(payload: bytes) -> None:
+    limit = TOPICS["imu"].max_bytes
+    quick = outcome(lambda p: decode_batch(p, limit), payload)
+    thorough = outcome(lambda p: decode(p, messages.SampleBatch, limit), payload)
+    if isinstance(thorough, Drop) and not isinstance(quick, Drop):
+        assert thorough is Drop.MALFORMED  # in a field that is unknown: as if it were not there
+        plain = msgpack.unpackb(encode(quick))
+        assert decode(msgpack.packb(plain), messages.SampleBatch) == quick
+    else:
+        assert quick == thorough
+
+
+def test_the_quick_way_refuses_by_the_same_names() -> None:
+    good = GOOD[messages.SampleBatch]
+    for payload, drop in (
+        (msgpack.packb({**good, "m": "imu/2"}), Drop.WRONG_VERSION),
+        (msgpack.packb({"m": "command/1"}), Drop.WRONG_VERSION),
+        (msgpack.packb({**good, "dt": "text"}), Drop.WRONG_TYPE),
+        (msgpack.packb(good) + b"\x00", Drop.MALFORMED),
+        (msgpack.packb({**good, "acc": b"\x00" * 9000}), Drop.OVERSIZE),
+        (b"\x91" * 5000, Drop.MALFORMED),
+    ):
+        assert outcome(lambda p: decode_batch(p, 8192), payload) is drop

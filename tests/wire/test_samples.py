@@ -17,6 +17,7 @@ from brachium_wire.samples import (
     MAX_MAG,
     MAX_SAMPLES,
     MAX_SPAN_NS,
+    read_many,
     read_samples,
     write_samples,
 )
@@ -202,3 +203,21 @@ def test_any_blocks_give_samples_or_a_named_drop(
             continue
         for block in (samples.acc, samples.gyr, samples.mag, samples.quat):
             assert block is None or np.isfinite(block).all()
+
+
+@given(st.lists(st.sampled_from([None, *(fault[1] for fault in FAULTS)]), max_size=12))
+def test_many_at_once_are_read_as_one_by_one(faults: list[dict[str, Any] | None]) -> None:
+    batches = [batch(**(changes or {}), late=bool(i % 2)) for i, changes in enumerate(faults)]
+    results = read_many(batches)
+    assert len(results) == len(batches)
+    for one, result in zip(batches, results, strict=True):
+        try:
+            alone = read_samples(one)
+        except WireError as error:
+            assert isinstance(result, WireError)
+            assert (result.drop, str(result)) == (error.drop, str(error))  # noqa: PT017
+            continue
+        assert not isinstance(result, WireError)
+        assert result.late == one.late
+        for name in ("acc", "gyr", "mag"):
+            np.testing.assert_array_equal(getattr(result, name), getattr(alone, name))
