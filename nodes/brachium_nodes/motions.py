@@ -27,6 +27,9 @@ SHIFTS = ("shift_out", "shift_forward", "shift_up")
 
 DEG = pi / 180.0
 
+SHOULDER_SWAY_DEG = 0.2
+"""Standard deviation of each shoulder angle: no one holds a shoulder perfectly still."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Build:
@@ -82,8 +85,8 @@ class Keyframes:
             plane = DEG * values["plane"]
             values["shoulder_flexion"] = values["elevation"] * np.sin(plane)
             values["shoulder_abduction"] = values["elevation"] * np.cos(plane)
-        for name in ANGLES[:3]:  # no one holds a shoulder perfectly still
-            values[name] = values[name] + 0.4 * variation.wander(name, t, 0.05, 0.4)
+        for name in ANGLES[:3]:
+            values[name] = values[name] + SHOULDER_SWAY_DEG * variation.wander(name, t, 0.05, 0.4)
         return posture(values)
 
     def _value(self, name: str, fraction: Array, extent: Array) -> Array:

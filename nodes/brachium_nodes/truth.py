@@ -1,5 +1,6 @@
 """What an emulated wearer really does, in the skeleton's terms."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -9,7 +10,8 @@ from brachium_body import rotation
 from brachium_body.angles import COLUMNS, joint_angles
 from brachium_body.continuation import AngleTracker
 from brachium_body.kinematics import TRUNK_FROM_THORAX
-from brachium_body.segments import Side, arm_segments
+from brachium_body.segments import Segment, Side, arm_segments
+from brachium_nodes.mounting import Worn
 from brachium_nodes.movement import Array
 from brachium_nodes.person import Person
 from brachium_wire.messages import Quaternion, SegmentPose, Skeleton, Vector
@@ -22,6 +24,8 @@ class Truth:
     trunk_from_world: Array
     world_from_segment: dict[str, Array]
     """By segment, with the sternum: (n, 4)."""
+    world_from_sensor: dict[str, Array]
+    """By segment with a sensor: (n, 4), without the skin's wobble."""
     positions: dict[str, Array]
     """shoulder, elbow, wrist, hand in trunk axes from the chest: (n, 3) m."""
     angles: Array
@@ -31,8 +35,8 @@ class Truth:
     """(n, 3) m in trunk axes."""
 
 
-def arm_truth(person: Person, t: Array, side: Side) -> Truth:
-    """Return what one arm does at true times (n,) s."""
+def arm_truth(person: Person, worn: Mapping[Segment, Worn], t: Array, side: Side) -> Truth:
+    """Return what one arm and the sensors on it and on the chest do at true times (n,) s."""
     trunk, arm = person.trunk(t), person.arm(t, side)
     trunk_from_world = rotation.multiply(TRUNK_FROM_THORAX, rotation.inverse(trunk.world_from_thorax))
     chain = (trunk.world_from_thorax, *arm.world_from.values())
@@ -48,9 +52,11 @@ def arm_truth(person: Person, t: Array, side: Side) -> Truth:
         shoulder_shift=arm.shift,
         chest_to_shoulder=person.lengths.chest_to_shoulder,
     )
+    segments: tuple[Segment, ...] = ("sternum", *arm_segments(side))
     return Truth(
         trunk_from_world,
-        dict(zip(("sternum", *arm_segments(side)), chain, strict=True)),
+        dict(zip(segments, chain, strict=True)),
+        {name: worn[name].pose(t, person)[0] for name in segments if name in worn},
         {name: rotation.rotate(trunk_from_world, p - trunk.chest) for name, p in arm.joints.items()},
         angles,
         shoulder,
@@ -74,6 +80,7 @@ def skeletons(truth: Truth, t: Array, side: Side, start_ns: int, tracker: AngleT
 
 
 def _skeleton(truth: Truth, i: int, angles: Array, side: Side, time_ns: int) -> Skeleton:
+    sensors = truth.world_from_sensor
     return Skeleton(
         time_ns=time_ns,
         side=side,
@@ -81,7 +88,11 @@ def _skeleton(truth: Truth, i: int, angles: Array, side: Side, time_ns: int) -> 
         forward="facing",
         trunk_from_world=_four(truth.trunk_from_world[i]),
         segments={
-            name: SegmentPose(quality="good", world_from_segment=_four(q[i]))
+            name: SegmentPose(
+                quality="good",
+                world_from_segment=_four(q[i]),
+                world_from_sensor=_four(sensors[name][i]) if name in sensors else None,
+            )
             for name, q in truth.world_from_segment.items()
         },
         positions={name: _three(p[i]) for name, p in truth.positions.items()},

@@ -117,7 +117,7 @@ class Wearer:
         self.segments = settings.worn()
         seed, errors = settings.seed, LEVELS[settings.level]
         self._errors = errors
-        self._worn = {s: Worn.put_on(s, self.person, errors) for s in self.segments}
+        self._worn: dict[Segment, Worn] = {s: Worn.put_on(s, self.person, errors) for s in self.segments}
         self._chips = {s: Chip.draw(errors, seed, s) for s in self.segments}
         self.clocks = {
             s: EmulatedClock.draw(settings.rate_hz, settings.skew_ppm, seed, s) for s in self.segments
@@ -169,7 +169,8 @@ class Wearer:
 
     def truth(self, time_s: npt.ArrayLike, side: Side) -> Truth:
         """Return what one arm really does at true times (n,) s; angles in their principal ranges."""
-        return arm_truth(self.person, np.atleast_1d(np.asarray(time_s, dtype=np.float64)), side)
+        t = np.atleast_1d(np.asarray(time_s, dtype=np.float64))
+        return arm_truth(self.person, self._worn, t, side)
 
     def skeletons(
         self, time_s: npt.ArrayLike, side: Side, start_ns: int, tracker: AngleTracker
@@ -179,7 +180,7 @@ class Wearer:
         `tracker` follows one arm; keep it from call to call, so that angles go on without jumps.
         """
         t = np.atleast_1d(np.asarray(time_s, dtype=np.float64))
-        return skeletons(arm_truth(self.person, t, side), t, side, start_ns, tracker)
+        return skeletons(self.truth(t, side), t, side, start_ns, tracker)
 
     def _make_block(self, segment: Segment, block: int) -> tuple[Array, Array, Array, Array]:
         """Return time, acc, gyr, mag of one block. It is always made whole, so no cut changes a bit."""

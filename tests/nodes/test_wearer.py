@@ -6,12 +6,15 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from vqf import offlineVQF
 
-from brachium_body.angles import COLUMNS, INDEX
+from brachium_body.angles import COLUMNS, INDEX, joint_angles
 from brachium_body.continuation import AngleTracker
 from brachium_body.kinematics import JOINTS, joint_orientations, positions
+from brachium_body.rotation import angle_between, inverse, mean, multiply
 from brachium_nodes.exercises import EXERCISES
 from brachium_nodes.link import FaultSettings
+from brachium_nodes.sensors import calibrated
 from brachium_nodes.wearer import Packet, Readings, Wearer, WearerSettings
 from brachium_wire.codec import decode, encode
 from brachium_wire.messages import Skeleton
@@ -22,25 +25,20 @@ BLOCKS = ("time_s", "acc", "gyr", "mag")
 
 
 def same(a: Readings, b: Readings) -> bool:
-    return all(
-        np.array_equal(getattr(a, k), getattr(b, k)) for k in ("time_s", "acc", "gyr", "mag", "mag_index")
-    )
+    return all(np.array_equal(getattr(a, name), getattr(b, name)) for name in BLOCKS)
 
 
 @given(first=st.integers(0, 900), cuts=st.lists(st.integers(1, 130), min_size=1, max_size=6))
 @settings(max_examples=25, deadline=None)
 def test_any_cut_into_pieces_gives_the_same_samples_bit_for_bit(first: int, cuts: list[int]) -> None:
-    settings_ = WearerSettings(level="typical", exercise="reaching", seed=4, rate_hz=50.0)
-    whole = Wearer(settings_).samples("forearm_r", first, sum(cuts))
-    wearer = Wearer(settings_)
+    made = WearerSettings(level="typical", exercise="reaching", seed=4, rate_hz=50.0)
+    whole = Wearer(made).samples("forearm_r", first, sum(cuts))
+    wearer = Wearer(made)
     starts = [first + sum(cuts[:i]) for i in range(len(cuts))]
-    pieces = {
-        at: wearer.samples("forearm_r", at, n) for at, n in reversed(list(zip(starts, cuts, strict=True)))
-    }
-    for name in ("time_s", "acc", "gyr", "mag"):
-        assert np.array_equal(
-            np.concatenate([getattr(pieces[at], name) for at in starts]), getattr(whole, name)
-        )
+    backwards = [wearer.samples("forearm_r", at, n) for at, n in zip(starts[::-1], cuts[::-1], strict=True)]
+    for name in BLOCKS:
+        joined = np.concatenate([getattr(piece, name) for piece in backwards[::-1]])
+        assert np.array_equal(joined, getattr(whole, name))
 
 
 def test_the_same_seed_gives_the_same_bytes_and_another_seed_others() -> None:
@@ -80,9 +78,8 @@ def test_the_truth_is_what_forward_kinematics_makes_of_its_angles(exercise: str,
     truth = wearer.truth(t, side)  # type: ignore[arg-type]
     segments = joint_orientations(truth.angles[:, THETA], side, carrying=np.radians(-8.0))  # type: ignore[arg-type]
     for mine, theirs in zip(list(truth.world_from_segment.values())[1:], segments, strict=True):
-        assert (
-            np.abs(np.abs((mine * theirs).sum(axis=1)) - 1.0).max() < 1e-9
-        )  # facing north, trunk axes are the world's
+        # facing north, trunk axes are the world's
+        assert angle_between(mine, theirs).max() < 1e-7
     chain = positions(*segments, wearer.person.lengths, side, truth.shoulder_shift)  # type: ignore[arg-type]
     for joint, name in enumerate(JOINTS):
         assert np.abs(truth.positions[name] - chain[:, joint]).max() < 1e-9
@@ -96,6 +93,43 @@ def test_clinical_angles_read_from_the_truth_are_those_that_were_set(exercise: s
     truth, posture, trunk = wearer.truth(t, "left"), wearer.person.posture(t, "left"), wearer.person.trunk(t)
     for name, angle in {**posture.angles, **trunk.angles}.items():
         assert np.abs(truth.angles[:, INDEX[name]] - angle).max() < 1e-7, name
+
+
+def test_the_truth_knows_where_its_sensors_are() -> None:
+    wearer = Wearer(WearerSettings(exercise="reaching", segments=("forearm_r", "sternum"), seed=9))
+    truth = wearer.truth(np.arange(0.0, 10.0, 0.1), "right")
+    assert set(truth.world_from_sensor) == {"forearm_r", "sternum"}
+    for segment, sensor in truth.world_from_sensor.items():
+        mounted = multiply(inverse(truth.world_from_segment[segment]), sensor)  # rigid: it never changes
+        assert angle_between(mounted, mounted[:1]).max() < 1e-7
+        nominal = wearer.info(segment).mounting  # type: ignore[arg-type]
+        assert 1.0 < np.degrees(angle_between(mounted[0], nominal)) < 30.0
+    (skeleton,) = wearer.skeletons(3.0, "right", 0, AngleTracker())
+    assert skeleton.segments["hand_r"].world_from_sensor is None
+    assert skeleton.segments["forearm_r"].world_from_sensor == pytest.approx(
+        truth.world_from_sensor["forearm_r"][30]
+    )
+
+
+@pytest.mark.parametrize(("level", "most_deg"), [("exact", 1.0), ("ideal", 2.0), ("typical", 5.0)])
+@pytest.mark.parametrize("side", ["right", "left"])
+def test_a_filter_of_others_and_a_pose_find_the_elbow(level: str, most_deg: float, side: str) -> None:
+    """VQF in east, north, up turns samples into orientations; standing in neutral gives the mounting."""
+    wearer = Wearer(WearerSettings(level=level, arms=side, skew_ppm=0.0, seed=3))  # type: ignore[arg-type]
+    neutral, found = np.full(4, 0.5), []
+    for segment in wearer.segments[:2]:
+        r = wearer.samples(segment, 0, 3000)
+        acc, gyr, mag = map(
+            np.ascontiguousarray, calibrated(wearer.info(segment).calibration, r.acc, r.gyr, r.mag)
+        )
+        world_from_sensor = offlineVQF(gyr, acc, mag, 0.01)["quat9D"]
+        found.append(multiply(world_from_sensor, multiply(inverse(mean(world_from_sensor[:350])), neutral)))
+    elbow = joint_angles(np.full(4, np.nan), multiply(inverse(found[0]), found[1]), np.full(4, np.nan), side)  # type: ignore[arg-type]
+    truth = wearer.truth(r.time_s, side).angles  # type: ignore[arg-type]
+    column = INDEX["elbow_flexion"]
+    off = np.degrees(elbow[:, column] - truth[:, column])
+    assert np.sqrt((off**2).mean()) < most_deg
+    assert np.degrees(np.ptp(truth[:, column])) > 80.0
 
 
 def test_skeletons_travel_and_their_angles_have_no_jumps() -> None:
