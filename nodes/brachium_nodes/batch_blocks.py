@@ -13,8 +13,8 @@ from brachium_wire.messages import SampleBatch, Vector
 from brachium_wire.samples import read_samples
 
 MAX_SEQUENCE = 1 << 48
-MAX_DEVICE_US = 1 << 50
-"""35 years: a clock beyond that is not a clock."""
+MAX_DEVICE_US = 1 << 53
+"""285 years: room for a clock that counts from 1970."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -31,7 +31,7 @@ class Measured:
 def measure(frame: Batch, hello: Hello) -> Measured:
     """Return what a batch of this node holds, in SI, or raise WireError."""
     if not 0 <= frame.sequence < MAX_SEQUENCE or not 0 <= frame.device_us < MAX_DEVICE_US:
-        raise WireError(Drop.OUT_OF_RANGE, "batch/1: seq and t must be positive, below 2^48 and 2^50")
+        raise WireError(Drop.OUT_OF_RANGE, "batch/1: seq and t must be positive, below 2^48 and 2^53")
     n, tail = divmod(len(frame.offsets), 4)
     if tail or not 1 <= n <= MAX_FRAME_SAMPLES:
         raise WireError(

@@ -147,8 +147,8 @@ class NodeClock:
 
     def _estimate(self, device_us: int) -> bool:
         """Set line and gap; return whether there was anything to estimate from."""
-        self._fit_us = device_us
         if not self._exchanges:
+            self._fit_us = device_us
             self._intercept = float(min(offset for _, offset in self._ups) - self._origin_ns)
             self._slope, self._gap_ns = 0.0, 2.0 * ONE_WAY_NS
             return True
@@ -156,7 +156,7 @@ class NodeClock:
             ups = self._points(self._ups)
             downs = self._points(self._downs)
             self._intercept, self._slope, self._gap_ns = between(ups, downs)
-            self._settled = True
+            self._fit_us, self._settled = device_us, True
         elif not self._settled:
             came_us, offset, round_trip = min(self._exchanges, key=lambda e: e[2])
             self._intercept, self._slope, self._gap_ns = (

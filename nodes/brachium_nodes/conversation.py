@@ -7,7 +7,7 @@ from typing import Literal
 import msgspec
 
 from brachium_nodes import node_frames as f
-from brachium_nodes.batch_blocks import Measured, measure
+from brachium_nodes.batch_blocks import MAX_DEVICE_US, Measured, measure
 from brachium_nodes.roster import Admission, Refusal
 from brachium_wire.codec import Drop, WireError, encode
 from brachium_wire.messages import Info, Message, SampleBatch, Status
@@ -269,7 +269,7 @@ class Conversation:
     def _answer(self, frame: f.ClockAnswer, now_ns: int) -> list[Action]:
         assert self.admission is not None
         asked_ns = self._asked.pop(frame.id, None)
-        fits = 0 <= frame.came_us <= frame.left_us < 1 << 50
+        fits = 0 <= frame.came_us <= frame.left_us < MAX_DEVICE_US
         if (
             asked_ns is None
             or not fits
