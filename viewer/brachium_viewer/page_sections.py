@@ -44,7 +44,7 @@ class PageTable:
 
 
 def arm_section(who: c.Who, contents: Contents, figures: ArmFigures) -> Arm:
-    """Return one arm's charts: its angles, and how far wrist and fingertip are from the true ones."""
+    """Return one arm's charts: its angles, and how far the fingertip is from the true one."""
     arm = contents.arms[who]
     start = int(c.times_ns(arm.published).min())
     time: c.Floats = (c.times_ns(arm.published) - start) / 1e9
@@ -68,14 +68,12 @@ def arm_section(who: c.Who, contents: Contents, figures: ArmFigures) -> Arm:
         )
         svg = charts.line(f"{'-'.join(who)}-{name}", time, values, "deg", true=true, settled_s=settled_s)
         drawn.append(Chart(name.replace("_", " ").capitalize(), label, svg))
-    for joint in ("wrist", "hand"):
-        if joint in figures.positions_mm:
-            error_mm = f.position_error_mm(arm, joint)
-            label = f"RMSE {figures.positions_mm[joint].rmse:.0f} mm"
-            svg = charts.line(
-                f"{'-'.join(who)}-{joint}", time, error_mm, "mm", settled_s=settled_s, from_zero=True
-            )
-            drawn.append(Chart(f"{JOINT_NAMES[joint].capitalize()}, distance from true", label, svg))
+    if "hand" in figures.positions_mm:
+        error_mm = f.position_error_mm(arm, "hand")
+        label = f"RMSE {figures.positions_mm['hand'].rmse:.0f} mm"
+        name = f"{'-'.join(who)}-hand"
+        svg = charts.line(name, time, error_mm, "mm", settled_s=settled_s, from_zero=True)
+        drawn.append(Chart("Fingertip, distance from true", label, svg))
     return Arm(f"{who[1].capitalize()} arm of {who[0]}", bool(arm.true), settled_s > time[0], drawn)
 
 

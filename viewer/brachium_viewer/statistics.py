@@ -6,6 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from brachium_body import rotation
+
 Array = npt.NDArray[np.float64]
 
 
@@ -72,3 +74,18 @@ def interpolate(time: Array, at: Array, values: Array, max_gap: float) -> Array:
     between[gap > max_gap] = np.nan
     result[inner] = between
     return result
+
+
+def orientation_errors_deg(estimate: Array, reference: Array) -> tuple[Array, Array, Array]:
+    """Return the whole angle, heading and inclination (n,) deg between world-from-body quaternions (n, 4).
+
+    The error turns reference into estimate in world axes, z up: its twist about z is the heading error, with
+    its sign, what remains is the inclination error (Laidig 2021, BROAD). NaN where one of them is not known.
+    """
+    error = rotation.multiply(estimate, rotation.inverse(reference))
+    error = np.where(error[:, :1] < 0.0, -error, error)
+    w, x, y, z = error.T
+    total = 2.0 * np.arctan2(np.sqrt(x * x + y * y + z * z), w)
+    heading = 2.0 * np.arctan2(z, w)
+    inclination = 2.0 * np.arctan2(np.hypot(x, y), np.hypot(w, z))
+    return np.degrees(total), wrap_deg(np.degrees(heading)), np.degrees(inclination)
