@@ -150,7 +150,11 @@ def hosts(urls: list[str]) -> set[str | None]:
 
 def test_the_arm_is_seen_and_moves_and_the_browser_talks_to_nobody_else(router_endpoint, arm_at, open_view):
     sync_playwright = require()
-    with open_view(router_endpoint) as running, moving(router_endpoint, arm_at), sync_playwright() as driver:
+    with (
+        open_view(router_endpoint, rate_hz=10.0) as running,
+        moving(router_endpoint, arm_at),
+        sync_playwright() as driver,
+    ):
         browser = driver.chromium.launch(executable_path=str(CHROMIUM), headless=True, args=FLAGS)
         page = browser.new_page(viewport={"width": SIZE[0], "height": SIZE[1]})
         page.add_init_script(COUNT_REFUSED)

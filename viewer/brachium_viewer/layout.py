@@ -114,9 +114,9 @@ def _eye(layout: Layout) -> Any:
     sides = {arm.side for arm in layout.arms}
     middle = (place_of(0) + place_of(people - 1)) / 2
     aside = 0.0 if len(sides) > 1 else 0.8 if "right" in sides else -0.8
-    away = 1.25 + 1.1 * (people - 1)
+    away = 1.35 + 1.1 * (people - 1)
     return rrb.EyeControls3D(
-        position=(middle + aside, away, CHEST_HEIGHT + 0.22),
-        look_target=(middle + 0.2 * aside, 0.1, CHEST_HEIGHT - 0.12),
+        position=(middle + aside, away, CHEST_HEIGHT + 0.16),
+        look_target=(middle + 0.2 * aside, 0.1, CHEST_HEIGHT - 0.2),
         eye_up=(0.0, 0.0, 1.0),
     )

@@ -25,7 +25,6 @@ if TYPE_CHECKING:
 
 log = logging.getLogger(__name__)
 
-TICK_S = 1.0 / 30.0
 _TAILS = ("skeleton/*", "truth/*", "imu/*/status", "calibration")
 _INBOX = 4096
 
@@ -45,6 +44,8 @@ class ViewSettings:
     """Port of the stream on loopback; 0 takes any free one."""
     memory_limit: str = "256MB"
     """What the viewer and its server may keep of the past; the oldest goes first."""
+    rate_hz: float = 30.0
+    """Pictures a second; a machine without a graphics card keeps up with 10."""
     open_browser: bool = False
     on_address: Callable[[str], None] | None = None
     """Called with the page's address when it can be opened."""
@@ -111,13 +112,14 @@ def _show(
     retained = bus.fetch(keys.subjects(settings.room, "calibration", settings.subject))
     try:
         while not stop.is_set() and viewer.running() and screen.error is None:
-            due_s = time.monotonic() + TICK_S
+            due_s = time.monotonic() + 1.0 / settings.rate_hz
             news = retained + [item for inbox in inboxes for item in inbox.drain()]
             retained = []
             draw(newest(news), picture, screen, time.monotonic() - start_s, heart.drops)
             heart.counts["received"] = sum(inbox.received for inbox in inboxes)
             heart.counts["overflow"] = sum(inbox.dropped for inbox in inboxes)
             heart.counts["delivered"] = screen.delivered
+            heart.counts["turned_away"] = picture.turned_away
             heart.counts["replaced"] = screen.mailbox.replaced
             heart.beat()
             stop.wait(max(0.0, due_s - time.monotonic()))

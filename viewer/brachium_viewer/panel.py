@@ -1,10 +1,15 @@
 """The words beside the picture, as Markdown: whose arm it is, what it rests on, how its sensors fare."""
 
+import re
 from collections.abc import Mapping
 
 from brachium_wire.messages import Calibration, Forward, Origin, Skeleton, Status
 
 NOT_A_DEVICE = "Brachium is a measuring and research tool, not a medical device."
+LONGEST = 200
+"""Characters of one remark; a longer one is cut."""
+MOST = 8
+"""Warnings that are shown."""
 ORIGIN: Mapping[Origin, str] = {
     "worn": "worn by a person",
     "emulated": "EMULATED WEARER, nobody is measured",
@@ -24,6 +29,13 @@ FORWARD: Mapping[Forward, str] = {
 }
 
 
+def plain(text: str) -> str:
+    """Return words from the network such that Markdown takes them for words: no link, picture or heading."""
+    short = " ".join(text.split())
+    short = short if len(short) <= LONGEST else short[:LONGEST] + "…"
+    return re.sub(r"(_|[^\w\s.,:;%°+-])", r"\\\1", short)
+
+
 def describe(
     subject: str,
     skeletons: Mapping[str, Skeleton],
@@ -34,15 +46,15 @@ def describe(
 ) -> str:
     """Return the panel of one subject; `skeletons` by side, `statuses` by segment."""
     newest = next(iter(skeletons.values()))
-    lines = [f"### {subject}: {ORIGIN[newest.origin]}", ""]
+    lines = [f"### {plain(subject)}: {ORIGIN[newest.origin]}", ""]
     if silent:
         lines.append("**No skeleton arrives any more.** The last pose is shown in grey.\n")
     lines.append(f"- Forward: {FORWARD[newest.forward]}")
     lines.append(f"- Calibration: {_calibration(calibration)}")
     assumed = sorted({name for skeleton in skeletons.values() for name in skeleton.assumed})
     if assumed:
-        lines.append(f"- Not plainly measured: {', '.join(name.replace('_', ' ') for name in assumed)}")
-    lines += [f"- {warning}" for warning in (calibration.warnings if calibration else [])]
+        lines.append(f"- Not plainly measured: {plain(', '.join(assumed).replace('_', ' '))}")
+    lines += [f"- {plain(warning)}" for warning in (calibration.warnings[:MOST] if calibration else [])]
     if statuses:
         lines += ["", "| sensor | samples/s | lost | battery | signal |", "|---|---|---|---|---|"]
         lines += [_sensor(segment, statuses[segment]) for segment in sorted(statuses)]
@@ -51,7 +63,7 @@ def describe(
 
 def key(colours: Mapping[tuple[str, str], str], *, truth: bool) -> str:
     """Return what the plots' lines mean; `colours` names the colour of each (subject, side)."""
-    lines = [f"{colour} = {subject} {side}" for (subject, side), colour in colours.items()]
+    lines = [f"{colour} = {plain(subject)} {side}" for (subject, side), colour in colours.items()]
     lines += ["broad pale = what the wearer really does"] if truth else []
     return f"Plots: {', '.join(lines)}, grey = AAOS reference."
 
@@ -66,15 +78,16 @@ def _calibration(calibration: Calibration | None) -> str:
         "refused": "**refused**",
     }[calibration.state]
     if calibration.pose:
-        text += f" ({calibration.pose})"
-    return text + (f": {calibration.reason}" if calibration.reason else "")
+        text += f" ({plain(calibration.pose)})"
+    return text + (f": {plain(calibration.reason)}" if calibration.reason else "")
 
 
 def _sensor(segment: str, status: Status) -> str:
+    name = plain(segment.replace("_", " "))
     asked = status.received + status.lost
     lost = f"{100 * status.lost / asked:.2f} %" if asked else "–"
     cells = (
-        segment.replace("_", " ") if status.connected else f"**{segment.replace('_', ' ')}: gone**",
+        name if status.connected else f"**{name}: gone**",
         "–" if status.rate_hz is None else f"{status.rate_hz:.0f}",
         lost,
         "–" if status.battery_v is None else f"{status.battery_v:.2f} V",

@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
+from brachium_body.segments import SEGMENTS
 from brachium_viewer import panel
 from brachium_viewer.drawings import Arm, Drawing, Label, Layout, Range, Text
 from brachium_viewer.scene import (
@@ -23,6 +24,8 @@ SETTLE_S = 1.0
 """Panels are arranged anew this long after the last arm or angle came, so that they do not jump."""
 SLOW_S = 1.0
 """Words and reference lines are drawn this often."""
+MAX_SUBJECTS = 8
+"""More people than that do not fit into one picture; who comes later is counted and not shown."""
 ANCHOR_S = 1.0
 """A stream whose time and arrival drift further apart than this is anchored again."""
 
@@ -54,14 +57,20 @@ class Picture:
         self._arranged: Layout | None = None
         self._changed_s = 0.0
         self._slow_s = -SLOW_S
+        self.turned_away = 0
 
     def feed(self, subject: str, topic: str, detail: str, message: Message, now_s: float) -> Moment | None:
         """Take one message; return what it changes in the picture and the moment it belongs to."""
+        if subject not in self._subjects and len(self._subjects) >= MAX_SUBJECTS:
+            self.turned_away += 1
+            return None
         if isinstance(message, Skeleton):
             return self._skeleton(subject, message, topic == "truth", now_s)
-        if isinstance(message, Calibration):
+        if isinstance(message, Calibration) and (
+            subject in self._subjects or len(self._calibrations) < MAX_SUBJECTS
+        ):
             self._calibrations[subject] = message
-        elif isinstance(message, Status) and subject in self._subjects:
+        elif isinstance(message, Status) and subject in self._subjects and detail in SEGMENTS:
             self._subjects[subject].statuses[detail] = message
         return None
 

@@ -14,6 +14,7 @@ import numpy as np
 
 from brachium_body import rotation
 from brachium_body.ranges import REFERENCE
+from brachium_body.segments import SEGMENTS
 from brachium_viewer.drawings import Arm, Capsules, Colour, Degrees, Drawing, Floats, Lane
 from brachium_wire.messages import Quality, Skeleton
 
@@ -68,13 +69,10 @@ _BONES = (
 _JOINT_RADIUS = {"shoulder": 0.052, "elbow": 0.043, "wrist": 0.035}
 # The figure, in trunk axes: two ends and a radius, m.
 _TORSO = (
-    # Hips to chest: capsules close beside one another make one smooth shape.
-    *(
-        ((0.7 * x, -0.03, -0.44), (x, -0.03, -0.09), 0.092)
-        for x in (-0.1, -0.07, -0.035, 0.0, 0.035, 0.07, 0.1)
-    ),
-    ((-0.07, -0.03, -0.45), (0.07, -0.03, -0.45), 0.096),
-    ((-0.16, -0.01, -0.01), (0.16, -0.01, -0.01), 0.050),
+    ((-0.045, -0.03, -0.36), (-0.065, -0.03, -0.13), 0.115),
+    ((0.045, -0.03, -0.36), (0.065, -0.03, -0.13), 0.115),
+    ((-0.07, -0.03, -0.46), (0.07, -0.03, -0.46), 0.098),
+    ((-0.16, -0.01, -0.01), (0.16, -0.01, -0.01), 0.052),
     ((0.0, -0.02, 0.0), (0.0, 0.0, 0.12), 0.048),
     ((0.0, 0.015, 0.20), (0.0, 0.005, 0.25), 0.085),
 )
@@ -189,7 +187,8 @@ def draw_skeleton(
     out.update({f"angles/{angle}/{line}": value for angle, value in angles_deg(skeleton).items()})
     if not truth:
         for segment, pose in skeleton.segments.items():
-            out[f"quality/{subject}/{segment}"] = Lane(pose.quality)
+            if segment in SEGMENTS:
+                out[f"quality/{subject}/{segment}"] = Lane(pose.quality)
     return out
 
 

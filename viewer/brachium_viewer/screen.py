@@ -88,8 +88,10 @@ class Pen:
             case Lane():
                 self._lane(path, drawing.quality)
             case Label():
-                words = {"labels": [drawing.text], "show_labels": True, "colors": [WHITE]}
-                log_one(path, rr.Points3D([drawing.at], radii=[0.001], **words))
+                at = rr.Points3D(
+                    [drawing.at], radii=[0.001], colors=[WHITE], labels=[drawing.text], show_labels=True
+                )
+                log_one(path, at)
             case Text():
                 log_one(path, rr.TextDocument(drawing.markdown, media_type="text/markdown"))
             case Layout():
