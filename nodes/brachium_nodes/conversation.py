@@ -192,8 +192,9 @@ class Conversation:
             self._said = frame
             return []
         assert isinstance(frame, f.Bye)
+        released = self._release()
         self.admission.memory.counter.end(frame.next_sequence)
-        return [*self._release(), *self._close(1000, "bye")]
+        return [*released, *self._close(1000, "bye")]
 
     def _batch(self, measured: Measured, now_ns: int) -> list[Action]:
         assert self.admission is not None

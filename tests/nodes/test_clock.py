@@ -59,7 +59,7 @@ def ns(seconds: float) -> int:
 def play(
     clock: NodeClock, happenings: list, from_s: float = 0.0
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Feed all; return published time, its error and stated uncertainty, ns, of each batch from `from_s` on."""
+    """Feed all; return published time, error and stated uncertainty, ns, of each batch from `from_s` on."""
     published, errors, stated = [], [], []
     newest_us = -1
     for arrived, what in happenings:

@@ -159,6 +159,15 @@ def test_loss_order_repeats_and_the_tail_are_counted() -> None:
     assert [b.sequence for b in node.of(SampleBatch)] == [0, 5, 15, 10, 20, 35]
 
 
+def test_the_tail_is_counted_even_when_the_clock_was_never_answered() -> None:
+    node = Node(Roster((ENTRY,))).hello()
+    node.now += 50 * MS
+    node.say(node.batch(0))
+    node.say(f.Bye(next_sequence=12))
+    status = node.talk.status(node.now, connected=False)
+    assert (status.received, status.lost) == (5, 7)
+
+
 def test_published_times_increase_and_out_of_order_ones_lie_before() -> None:
     node = joined()
     for sequence in (0, 10, 5, 15):
