@@ -131,9 +131,8 @@ def test_calibration_heading_and_sensors_stand_in_words(arm_at):
     refused = Calibration(
         time_ns=1, state="refused", pose="neutral", reason="forearm_r moved: stand still for 3 s"
     )
-    picture.feed(
-        "p01", "calibration", "", refused, 0.0
-    )  # came before the first skeleton, as retained ones do
+    # Retained ones come before the first skeleton.
+    picture.feed("p01", "calibration", "", refused, 0.0)
     feed(picture, arm_at(0), 0.0)
     status = Status(node="n", time_ns=1, connected=True, received=900, lost=100, out_of_order=0, rate_hz=99.6)
     picture.feed("p01", "status", "forearm_r", status, 0.0)
@@ -146,33 +145,27 @@ def test_calibration_heading_and_sensors_stand_in_words(arm_at):
 def test_words_from_the_network_are_words_and_nothing_else(arm_at):
     picture = Picture()
     evil = "![x](http://evil.example/x.png) <img src=y> `code` | # head\n# head " + 500 * "long"
-    picture.feed(
-        "p01", "calibration", "", Calibration(time_ns=1, state="refused", reason=evil, warnings=[evil]), 0.0
-    )
+    refused = Calibration(time_ns=1, state="refused", reason=evil, warnings=100 * [evil])
+    picture.feed("p01", "calibration", "", refused, 0.0)
     feed(picture, arm_at(0), 0.0)
     text = picture.tick(0.0)["words"].markdown
     assert r"\!\[x\]\(http:\/\/evil.example\/x.png\) \<img src\=y\> \`code\` \| \# head \# head" in text
     assert "](" not in text
     assert "<img" not in text.replace(r"\<img", "")
-    assert "long…" in text
-    assert len(text) < 1500
+    assert "lo…" in text
+    assert len(text) < 4000
 
 
 def test_a_flood_of_subjects_segments_and_statuses_fills_no_memory(arm_at):
     picture = Picture()
+    status = Status(node="n", time_ns=1, connected=True, received=1, lost=0, out_of_order=0)
     made_up = {f"tail_{n}": next(iter(arm_at(0).segments.values())) for n in range(50)}
     odd = msgspec.structs.replace(arm_at(0), segments=made_up)
     assert not [path for path in feed(picture, odd, 0.0, subject="s0")[1] if path.startswith("quality/")]
     for n in range(1, 100):
         picture.feed(f"s{n}", "calibration", "", Calibration(time_ns=1, state="done"), 0.0)
         picture.feed(f"s{n}", "skeleton", "right", arm_at(0), 0.0)
-        picture.feed(
-            "s0",
-            "status",
-            f"tail_{n}",
-            Status(node="n", time_ns=1, connected=True, received=1, lost=0, out_of_order=0),
-            0.0,
-        )
+        picture.feed("s0", "status", f"tail_{n}", status, 0.0)
     drawn = picture.tick(0.0)
     assert sum(path.endswith("/name") for path in drawn) == MAX_SUBJECTS
     assert "tail" not in drawn["words"].markdown

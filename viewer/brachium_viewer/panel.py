@@ -33,7 +33,7 @@ def plain(text: str) -> str:
     """Return words from the network such that Markdown takes them for words: no link, picture or heading."""
     short = " ".join(text.split())
     short = short if len(short) <= LONGEST else short[:LONGEST] + "…"
-    return re.sub(r"(_|[^\w\s.,:;%°+-])", r"\\\1", short)
+    return re.sub(r"([!-$&-*/<-@[-`{-~])", r"\\\1", short)  # ASCII alone: before others a backslash is shown
 
 
 def describe(
