@@ -104,7 +104,7 @@ def test_neighbours_are_of_one_arm_and_one_kind() -> None:
         "upper_arm_r_sensor",
         "hand_r_sensor",
     ]
-    assert compare._neighbours(stems) == [
+    assert alignment.neighbours(stems) == [
         ("sternum", "upper_arm_r"),
         ("upper_arm_r", "hand_r"),
         ("sternum", "upper_arm_l"),

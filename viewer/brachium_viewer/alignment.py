@@ -6,6 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from brachium_body import rotation
+from brachium_body.segments import SEGMENTS
 from brachium_viewer.statistics import interpolate, wrap_deg
 from brachium_wire.table import Column, Table, TableError
 
@@ -91,3 +92,26 @@ def numbers_at(time: Floats, at: Floats, values: Floats, *, turns: bool) -> Floa
 def difference(a: Floats, b: Floats, *, turns: bool) -> Floats:
     """Return a - b; of degrees within half a turn."""
     return wrap_deg(a - b) if turns else a - b
+
+
+def _segment(stem: str) -> str:
+    return stem.removesuffix("_sensor")
+
+
+def outwards(stem: str) -> tuple[bool, int, str]:
+    """Return what orders orientations: segments before sensors, from the trunk outwards."""
+    segment = _segment(stem)
+    place = SEGMENTS.index(segment) if segment in SEGMENTS else len(SEGMENTS)
+    return stem.endswith("_sensor"), place, stem
+
+
+def neighbours(stems: list[str]) -> list[tuple[str, str]]:
+    """Return the orientations next to each other on one arm, both of segments or both of sensors."""
+    pairs = []
+    for i, second in enumerate(stems):
+        for first in reversed(stems[:i]):
+            same_kind = first.endswith("_sensor") == second.endswith("_sensor")
+            if same_kind and (_segment(first)[-2:] == _segment(second)[-2:] or _segment(first) == "sternum"):
+                pairs.append((first, second))
+                break
+    return pairs

@@ -14,7 +14,6 @@ from brachium_wire.table import MissingExtra
 Floats = npt.NDArray[np.float64]
 
 INK, QUIET, MEASURED, TRUE, SHADE = "#1d2733", "#6b7785", "#0b5cad", "#f0b35f", "#eef1f4"
-_PAPER = {"facecolor": "white", "edgecolor": "none", "pad": 1.0, "alpha": 0.85}
 POINTS = 900
 """Points of a line at most: more than its pixels are of no use in print."""
 
@@ -114,7 +113,8 @@ def histogram(name: str, values: Floats, unit: str, marks: Mapping[str, float]) 
     figure, axes = _figure(3.65, 1.75)
     end = max(2.0 * max(marks.values()), 1.0)
     axes.hist(np.minimum(values, end), bins=np.linspace(0.0, end, 41).tolist(), color=MEASURED, alpha=0.85)
-    top = axes.get_ylim()[1]
+    top = 1.3 * axes.get_ylim()[1]  # the marks' names stand above the bars
+    axes.set_ylim(0.0, top)
     for place, (mark, value) in enumerate(marks.items()):
         axes.axvline(value, color=INK, linewidth=0.8, linestyle=(0, (3, 2)))
         axes.text(

@@ -9,7 +9,6 @@ import numpy as np
 import numpy.typing as npt
 
 from brachium_body.rotation import inverse, multiply
-from brachium_body.segments import SEGMENTS
 from brachium_viewer import alignment as al
 from brachium_viewer.statistics import ErrorFigures, error_figures, orientation_errors_deg
 from brachium_wire import table
@@ -121,7 +120,7 @@ class _Pair:
         b_name, self.b_time = al.time_of(b, names[1])
         common = [n for n in b.columns if n in a.columns and n not in (a_name, b_name, settings.mask)]
         stems = al.orientation_stems(common)
-        self.stems = sorted(stems, key=_outwards)
+        self.stems = sorted(stems, key=al.outwards)
         self.numbers = [
             n
             for n in common
@@ -171,7 +170,7 @@ class _Pair:
     def relative(self, lag_s: float) -> dict[str, ErrorFigures]:
         """Return the error of each orientation as seen from the one before it on the same arm."""
         found = {}
-        for first, second in _neighbours(self.stems):
+        for first, second in al.neighbours(self.stems):
             a, b = zip(self._pair_of(first, lag_s), self._pair_of(second, lag_s), strict=True)
             total, _, _ = orientation_errors_deg(_seen_from(*a), _seen_from(*b))
             if (figures := self._errors(total)) is not None:
@@ -213,28 +212,6 @@ def _counts(b: Table, time: Floats, settings: CompareSettings, name: str) -> Mas
     if settings.to_s is not None:
         counts &= time <= settings.to_s
     return counts
-
-
-def _segment(stem: str) -> str:
-    return stem.removesuffix("_sensor")
-
-
-def _outwards(stem: str) -> tuple[bool, int, str]:
-    segment = _segment(stem)
-    place = SEGMENTS.index(segment) if segment in SEGMENTS else len(SEGMENTS)
-    return stem.endswith("_sensor"), place, stem
-
-
-def _neighbours(stems: list[str]) -> list[tuple[str, str]]:
-    """Return the orientations next to each other on one arm, both of segments or both of sensors."""
-    pairs = []
-    for i, second in enumerate(stems):
-        for first in reversed(stems[:i]):
-            same_kind = first.endswith("_sensor") == second.endswith("_sensor")
-            if same_kind and (_segment(first)[-2:] == _segment(second)[-2:] or _segment(first) == "sternum"):
-                pairs.append((first, second))
-                break
-    return pairs
 
 
 def text(comparison: Comparison) -> str:

@@ -1,18 +1,15 @@
 """How the network fares: arrivals and their times in; live nodes, rates, loss and latency out."""
 
 from dataclasses import dataclass, field
-from typing import Literal
 
 from brachium_viewer.contents import outwards
 from brachium_viewer.statistics import percentiles
-from brachium_viewer.window import SECOND, WINDOW_NS, Window
+from brachium_viewer.window import SECOND, WINDOW_NS, State, Window, limit_s, state
 from brachium_wire import keys
 from brachium_wire.codec import WireError, decode_topic
 from brachium_wire.messages import Health, Info, SampleBatch, Skeleton, Status
 from brachium_wire.sequence import SequenceCounter
 from brachium_wire.topics import TOPICS
-
-State = Literal["live", "stale", "missing"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -161,19 +158,6 @@ class Network:
         )
 
 
-def state(age_s: float | None, stale_after_s: float, missing_after_s: float) -> State:
-    """Return what a value of this age is called; None: it never came."""
-    if age_s is None or age_s > missing_after_s:
-        return "missing"
-    return "stale" if age_s > stale_after_s else "live"
-
-
-def _limit(topic: str) -> float:
-    limit = TOPICS[topic].stale_after_s
-    assert limit is not None
-    return limit
-
-
 class _Node:
     def __init__(self) -> None:
         self.info: Info | None = None
@@ -189,7 +173,7 @@ class _Node:
     def report(self, subject: str, segment: str, now_ns: int) -> NodeHealth:
         age_s = self.window.age_s(now_ns)
         status, info, own = self.status, self.info, self.sequence
-        found = state(age_s, _limit("imu"), _limit("status"))
+        found = state(age_s, limit_s("imu"), limit_s("status"))
         if status is not None and not status.connected:
             found = "missing"
         uncertainty = status.clock_uncertainty_ns if status is not None else None
@@ -232,7 +216,7 @@ class _Arm:
         return ArmHealth(
             subject=subject,
             side=side,
-            state=state(age_s, _limit("skeleton"), _limit("status")),
+            state=state(age_s, limit_s("skeleton"), limit_s("status")),
             origin=self.last.origin,
             rate_hz=self.window.rate_hz(now_ns),
             nominal_hz=TOPICS["skeleton"].rate_hz or 0.0,
@@ -252,7 +236,7 @@ class _Service:
 
     def report(self, kind: str, name: str, now_ns: int) -> ServiceHealth:
         age_s = None if self.heard_ns is None else max(0.0, (now_ns - self.heard_ns) / SECOND)
-        fresh = age_s is None or age_s <= _limit("health")
+        fresh = age_s is None or age_s <= limit_s("health")
         return ServiceHealth(
             kind=kind,
             id=name,

@@ -102,11 +102,8 @@ def tables(figures: SummaryFigures) -> list[PageTable]:
 
 
 def _errors(who: str, arm: ArmFigures) -> PageTable:
-    rows = [
-        _row(name.replace("_", " "), "deg", 2, error)
-        for name, error in arm.angles_deg.items()
-        if name in f.CLINICAL
-    ]
+    angles = arm.angles_deg
+    rows = [_row(name.replace("_", " "), "deg", 2, angles[name]) for name in f.CLINICAL if name in angles]
     rows += [
         _row(f"{JOINT_NAMES.get(joint, joint)}, distance", "mm", 1, error)
         for joint, error in arm.positions_mm.items()

@@ -1,6 +1,11 @@
-"""What arrived during the last two seconds: rates, ages and values of one stream."""
+"""How fresh things are: names for ages, and what arrived on a stream during the last two seconds."""
 
 from collections import deque
+from typing import Literal
+
+from brachium_wire.topics import TOPICS
+
+State = Literal["live", "stale", "missing"]
 
 WINDOW_NS = 2_000_000_000
 SECOND = 1e9
@@ -40,3 +45,17 @@ class Window:
     def age_s(self, now_ns: int) -> float | None:
         """Return the time since the last arrival; None before the first."""
         return None if self.last_ns is None else max(0.0, (now_ns - self.last_ns) / SECOND)
+
+
+def state(age_s: float | None, stale_after_s: float, missing_after_s: float) -> State:
+    """Return what a value of this age is called; None: it never came."""
+    if age_s is None or age_s > missing_after_s:
+        return "missing"
+    return "stale" if age_s > stale_after_s else "live"
+
+
+def limit_s(topic: str) -> float:
+    """Return after how long a topic's value is stale, by the topic table."""
+    limit = TOPICS[topic].stale_after_s
+    assert limit is not None
+    return limit
