@@ -105,7 +105,12 @@ class Worn:
 
         `shift` (n, 3) m, in segment axes, is the skin's wobble; none if left out.
         """
-        bone, joint, angles = self._bone(t, person)
+        return self.pose_on(*self._bone(t, person), t, shift)
+
+    def pose_on(
+        self, bone: Array, joint: Array, angles: dict[str, Array], t: Array, shift: Array | None = None
+    ) -> tuple[Array, Array]:
+        """Return what `pose` does from world_from_segment (n, 4), the joint (n, 3) m and the angles at t."""
         skin, place = bone, np.array(self.place.lever)
         if self.tissue.any():
             pulled = np.einsum("nj,ji->ni", tissue.pull(angles, self.place.part), self.tissue)

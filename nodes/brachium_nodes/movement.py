@@ -5,6 +5,7 @@ from the seed and the number of the repetition.
 """
 
 from dataclasses import dataclass
+from functools import lru_cache
 from zlib import crc32
 
 import numpy as np
@@ -72,14 +73,19 @@ class Variation:
 
     def wander(self, name: str, t: Array, slowest_hz: float, fastest_hz: float) -> Array:
         """Return a slow random movement (n,) of standard deviation 1: a sum of six sinusoids."""
-        terms = np.arange(6)
-        spread = (terms + self.uniform(f"{name}/frequency", terms)) / len(terms)
-        frequency = slowest_hz + (fastest_hz - slowest_hz) * spread
-        phase = 2.0 * np.pi * self.uniform(f"{name}/phase", terms)
-        waves: Array = np.sin(2.0 * np.pi * frequency * t[:, None] + phase)
-        result: Array = waves.sum(axis=1) * np.sqrt(2.0 / len(terms))
+        turn, phase = _waves(self, name, slowest_hz, fastest_hz)
+        result: Array = np.sin(turn * t[:, None] + phase).sum(axis=1) * np.sqrt(2.0 / len(turn))
         return result
 
     def _start(self, number: Array, period_s: float) -> Array:
         jitter = _DURATION_SPREAD * (self.uniform("start", number) - 0.5)
         return period_s * (number + np.where(number > 0.0, jitter, 0.0))
+
+
+@lru_cache(maxsize=512)
+def _waves(variation: Variation, name: str, slowest_hz: float, fastest_hz: float) -> tuple[Array, Array]:
+    """Return angular frequencies in rad/s and phases of six sinusoids, spread over the band."""
+    terms = np.arange(6)
+    spread = (terms + variation.uniform(f"{name}/frequency", terms)) / len(terms)
+    turn = 2.0 * np.pi * (slowest_hz + (fastest_hz - slowest_hz) * spread)
+    return turn, 2.0 * np.pi * variation.uniform(f"{name}/phase", terms)

@@ -52,11 +52,17 @@ def arm_truth(person: Person, worn: Mapping[Segment, Worn], t: Array, side: Side
         shoulder_shift=arm.shift,
         chest_to_shoulder=person.lengths.chest_to_shoulder,
     )
+
+    def sensor(on: Worn, bone: Array) -> Array:
+        if on.segment == "sternum":
+            return on.pose(t, person)[0]
+        return on.pose_on(bone, arm.joints[on.place.joint], arm.angles, t)[0]
+
     segments: tuple[Segment, ...] = ("sternum", *arm_segments(side))
     return Truth(
         trunk_from_world,
         dict(zip(segments, chain, strict=True)),
-        {name: worn[name].pose(t, person)[0] for name in segments if name in worn},
+        {name: sensor(worn[name], q) for name, q in zip(segments, chain, strict=True) if name in worn},
         {name: rotation.rotate(trunk_from_world, p - trunk.chest) for name, p in arm.joints.items()},
         angles,
         shoulder,

@@ -145,6 +145,17 @@ def test_skeletons_travel_and_their_angles_have_no_jumps() -> None:
     assert np.degrees(max(s.angles["shoulder_abduction"] for s in skeletons)) > 140.0
 
 
+def test_a_stream_of_skeletons_is_the_same_truth() -> None:
+    wearer, tracker = Wearer(WearerSettings(exercise="circle")), AngleTracker()
+    start, first, period = 10**18, 10**18 + 7_000_003, 20_000_000
+    streamed = list(islice(wearer.skeleton_stream("right", start, first, period), 120))
+    assert [s.time_ns for s in streamed] == [first + period * k for k in range(120)]
+    for one in streamed:
+        (asked,) = wearer.skeletons((one.time_ns - start) * 1e-9, "right", start, tracker)
+        assert asked.angles == pytest.approx(one.angles, abs=1e-9)
+        assert asked.positions["wrist"] == pytest.approx(one.positions["wrist"], abs=1e-9)
+
+
 def test_the_other_arm_hangs_in_neutral() -> None:
     truth = Wearer(WearerSettings(exercise="drinking", arms="right")).truth(np.arange(0.0, 20.0, 0.1), "left")
     assert np.abs(truth.angles[:, INDEX["theta1"] : INDEX["wrist_deviation"] + 1]).max() < 1e-12
