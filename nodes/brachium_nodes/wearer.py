@@ -184,7 +184,7 @@ class Wearer:
         return skeletons(self.truth(t, side), t, side, start_ns, tracker)
 
     def skeleton_stream(self, side: Side, start_ns: int, first_ns: int, period_ns: int) -> Iterator[Skeleton]:
-        """Yield for ever the truth at host times first_ns, first_ns + period_ns, ...; `start_ns` is true time 0.
+        """Yield the truth for ever, at host times first_ns + k period_ns; `start_ns` is true time 0.
 
         They are made about a second at a time, which costs a tenth of asking for one by one.
         """
