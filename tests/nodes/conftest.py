@@ -13,7 +13,7 @@ from brachium_nodes.roster import NodeEntry
 from brachium_wire import keys
 from brachium_wire.bus import Bus
 from brachium_wire.codec import WireError, decode_topic
-from brachium_wire.messages import Health
+from brachium_wire.messages import Health, Status
 
 DEADLINE_S = 15.0
 ROOM = "test"
@@ -34,7 +34,7 @@ def until(condition: Callable[[], object], what: str) -> None:
         pause.wait(0.01)
 
 
-def free_port() -> int:
+def unused_port() -> int:
     with socket.socket() as s:
         s.bind(("127.0.0.1", 0))
         return int(s.getsockname()[1])
@@ -42,7 +42,7 @@ def free_port() -> int:
 
 @pytest.fixture(scope="session")
 def endpoint() -> Iterator[str]:
-    where = f"tcp/127.0.0.1:{free_port()}"
+    where = f"tcp/127.0.0.1:{unused_port()}"
     config = {
         "mode": "router",
         "listen": {"endpoints": [where]},
@@ -57,6 +57,11 @@ def endpoint() -> Iterator[str]:
         assert process.stdin is not None
         process.stdin.close()
         process.wait(timeout=5)
+
+
+@pytest.fixture
+def free_port() -> int:
+    return unused_port()
 
 
 @pytest.fixture
@@ -80,6 +85,21 @@ class Listener:
             except WireError as error:
                 raise AssertionError(f"{key}: {error}") from error
         return [m for k, m in self.heard if k.topic == topic and detail in (None, k.detail)]
+
+    def until(self, condition: Callable[[], object], what: str) -> None:
+        until(condition, what)
+
+    def until_gone(self, nodes: int) -> dict[tuple[str, str], Status]:
+        """Wait for the last status of so many nodes; return it by subject and segment."""
+
+        def gone() -> dict[tuple[str, str], Status]:
+            self.of("status")
+            return {
+                (k.subject, k.detail): m for k, m in self.heard if isinstance(m, Status) and not m.connected
+            }
+
+        until(lambda: len(gone()) == nodes, f"the last status of {nodes} nodes")
+        return gone()
 
 
 @pytest.fixture
@@ -125,7 +145,9 @@ def gateway(endpoint: str, bus: Bus) -> Iterator[Callable[..., Running]]:
     running: list[Running] = []
 
     def start(*nodes: NodeEntry, id: str = "gw-a", **more: object) -> Running:
-        settings = GatewaySettings(endpoint=endpoint, room=ROOM, id=id, port=0, nodes=nodes, **more)
+        settings = GatewaySettings(
+            **{"endpoint": endpoint, "room": ROOM, "id": id, "port": 0, "nodes": nodes} | more
+        )
         running.append(Running(settings, bus))
         return running[-1]
 

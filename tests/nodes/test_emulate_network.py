@@ -1,0 +1,169 @@
+"""Emulated wearers over a real network: what is injected is counted, and truth has the same time."""
+
+import threading
+import time
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from brachium_body.continuation import AngleTracker
+from brachium_nodes.emulate import EmulateSettings, node_entries, run
+from brachium_nodes.link import FaultSettings
+from brachium_nodes.node_client import NotWelcome
+from brachium_nodes.wearer import Wearer, WearerSettings
+from brachium_wire import keys
+from brachium_wire.codec import decode
+from brachium_wire.messages import Session
+from brachium_wire.samples import read_samples
+
+ROOM = "test"
+FAULTS = FaultSettings(loss=0.05, burst_loss=0.01, burst_packets=4, swap=0.05, duplicate=0.05)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "said"),
+    [
+        ({}, "token"),
+        ({"token": "x", "speed": 2.0}, "direct"),
+        ({"direct": True, "speed": 0.0}, "speed"),
+        ({"direct": True, "wearers": 0}, "wearers"),
+        ({"direct": True, "wearer": WearerSettings(batch=97)}, "frame"),
+        ({"direct": True, "id": "a--b"}, "host id"),
+    ],
+)
+def test_settings_that_cannot_be_are_refused(wrong, said) -> None:
+    with pytest.raises(ValueError, match=said):
+        EmulateSettings(**wrong)
+
+
+def elbow(wearer: Wearer, time_s: np.ndarray) -> np.ndarray:
+    skeletons = wearer.skeletons(time_s, "right", 0, AngleTracker())
+    return np.array([s.angles["elbow_flexion"] for s in skeletons])
+
+
+def subset(count) -> tuple[int, int, int]:
+    return count.sent, count.lost, count.swapped
+
+
+@pytest.mark.network
+def test_injected_and_counted_are_the_same_and_truth_has_gateway_time(gateway, listener, endpoint) -> None:
+    wearer = WearerSettings(level="exact", seed=3)
+    settings = EmulateSettings(
+        endpoint=endpoint, room=ROOM, token="t", seconds=5.6, wearer=wearer, faults=FAULTS
+    )
+    running = gateway(*node_entries(settings))
+    settings = EmulateSettings(**{**vars(settings), "gateway": running.url})
+    report = run(settings, threading.Event())
+    running.end()
+    last = listener.until_gone(3)
+    for segment, count in report.streams["p01"].items():
+        status = last["p01", segment]
+        assert (status.received, status.lost, status.out_of_order) == subset(count)
+        assert status.drops.get("repeated", 0) == count.duplicated
+        assert count.sent + count.lost == count.next_sequence
+        assert count.next_sequence >= 500
+    assert sum(c.lost for c in report.streams["p01"].values()) > 0
+    assert sum(c.swapped for c in report.streams["p01"].values()) > 0
+    assert {i.origin for i in listener.of("info")} == {"emulated"}
+
+    emulated = Wearer(wearer)
+    truth = listener.of("truth", "right")
+    assert {t.time_ns % 20_000_000 for t in truth} == {0}
+    assert {b.time_ns - a.time_ns for a, b in pairwise(truth)} == {20_000_000}
+    assert {t.origin for t in truth} == {"emulated"}
+    batches = listener.of("imu", "forearm_r")
+    index = np.array([b.sequence for b in batches])
+    taken_ns = np.rint(emulated.clocks["forearm_r"].sample_time_s(index) * 1e9).astype(np.int64)
+    origins = np.array([b.time_ns for b in batches]) - taken_ns
+    stated = np.array([b.uncertainty_ns for b in batches])
+    origin_ns = int(np.median(origins[-20:]))
+    assert (np.abs(origins - origin_ns) <= stated + stated[-1]).all()
+    # Truth told 1 ms too late would be off by as much as the elbow turns meanwhile.
+    moving = [t for t in truth if t.angles["elbow_flexion"] > 0.05]
+    told = np.array([t.angles["elbow_flexion"] for t in moving])
+    at_s = np.array([(t.time_ns - origin_ns) * 1e-9 for t in moving])
+    shifts = np.arange(-20, 21) * 1e-3
+    errors = [np.abs(elbow(emulated, at_s + shift) - told).max() for shift in shifts]
+    assert abs(shifts[int(np.argmin(errors))]) <= 0.002
+    assert len(moving) > 10
+
+
+@pytest.mark.network
+def test_several_wearers_publish_directly_and_faster(listener, endpoint) -> None:
+    settings = EmulateSettings(
+        endpoint=endpoint, room=ROOM, id="emu", direct=True, speed=4.0, seconds=3.0, wearers=2, faults=FAULTS
+    )
+    started = time.monotonic()
+    report = run(settings, threading.Event())
+    assert time.monotonic() - started < 3.0
+    last = listener.until_gone(6)
+    assert set(report.streams) == {"p001", "p002"}
+    for subject, streams in report.streams.items():
+        for segment, count in streams.items():
+            status = last[subject, segment]
+            assert (status.received, status.lost, status.out_of_order) == subset(count)
+    assert {i.host for i in listener.of("info")} == {"emu"}
+    for batch in listener.of("imu", "hand_r"):
+        assert read_samples(batch).acc is not None
+    assert report.streams["p001"] != report.streams["p002"]  # other seeds, other faults
+    topics = {k.topic for k, _ in listener.heard}
+    assert {"session", "truth", "health"} <= topics
+
+
+@pytest.mark.network
+def test_the_session_is_kept_for_who_comes_late(bus, endpoint) -> None:
+    stop = threading.Event()
+    settings = EmulateSettings(
+        endpoint=endpoint, room="late", direct=True, wearer=WearerSettings(arms="left")
+    )
+    thread = threading.Thread(target=run, args=(settings, stop))
+    thread.start()
+    deadline = time.monotonic() + 10
+    found: list = []
+    while not found and time.monotonic() < deadline:
+        found = bus.fetch(keys.session("late", "p01"))
+    stop.set()
+    thread.join(timeout=2)
+    assert not thread.is_alive(), "emulate did not end within 2 s"
+    session = decode(found[0][1], Session)
+    assert (session.side, session.height_m, session.facing_deg) == ("left", 1.8, 0.0)
+
+
+@pytest.mark.network
+def test_a_wrong_token_ends_with_its_reason(gateway, endpoint) -> None:
+    settings = EmulateSettings(endpoint=endpoint, room=ROOM, token="right")
+    url = gateway(*node_entries(settings)).url
+    wrong = EmulateSettings(endpoint=endpoint, room=ROOM, token="wrong", gateway=url)
+    with pytest.raises(NotWelcome, match="token"):
+        run(wrong, threading.Event())
+
+
+@pytest.mark.network
+def test_a_gateway_that_comes_back_finds_its_nodes_again(gateway, listener, endpoint, free_port) -> None:
+    settings = EmulateSettings(
+        endpoint=endpoint,
+        room=ROOM,
+        token="t",
+        gateway=f"ws://127.0.0.1:{free_port}/node",
+        wearer=WearerSettings(segments=("hand_r",)),
+    )
+    stop, reports = threading.Event(), []
+    thread = threading.Thread(target=lambda: reports.append(run(settings, stop)))
+    thread.start()
+    try:
+        first = gateway(*node_entries(settings), port=free_port)
+        listener.until(lambda: len(listener.of("imu")) >= 5, "batches through the first gateway")
+        first.end()
+        seen = len(listener.of("imu"))
+        second = gateway(*node_entries(settings), port=free_port, id="gw-a")
+        listener.until(lambda: len(listener.of("imu")) >= seen + 5, "batches through the second gateway")
+    finally:
+        stop.set()
+        thread.join(timeout=5)
+    second.end()
+    count = reports[0].streams["p01"]["hand_r"]
+    assert count.dropped > 0
+    assert count.lost == count.dropped
+    sequences = [b.sequence for b in listener.of("imu")]
+    assert sequences == sorted(set(sequences))
