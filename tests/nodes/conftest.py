@@ -76,14 +76,17 @@ class Listener:
     def __init__(self, bus: Bus, room: str = ROOM) -> None:
         self._inbox = bus.subscribe(keys.everything(room))
         self.heard: list[tuple[keys.Key, object]] = []
+        self.raw: list[tuple[str, bytes, object]] = []
 
     def of(self, topic: str, detail: str | None = None) -> list:
         for key, payload in self._inbox.drain():
             parsed = keys.parse(key)
             try:
-                self.heard.append((parsed, decode_topic(payload, parsed.topic)))
+                message = decode_topic(payload, parsed.topic)
             except WireError as error:
                 raise AssertionError(f"{key}: {error}") from error
+            self.heard.append((parsed, message))
+            self.raw.append((key, payload, message))
         return [m for k, m in self.heard if k.topic == topic and detail in (None, k.detail)]
 
     def until(self, condition: Callable[[], object], what: str) -> None:
