@@ -80,7 +80,7 @@ def test_a_recording_begins_with_the_state_then_what_is_retained_then_all_that_c
             return encode(Answer(ok=True, data={"snapshot": STATE}))
 
         bus.serve(keys.commands(ROOM, "record"), answer)
-        bus.serve(keys.commands(ROOM, "calibrate"), lambda key, _: asked.append((key, b"")) or b"")
+        bus.serve(keys.commands(ROOM, "calibrate"), answer)
         running = Running(RecordSettings(endpoint=endpoint, room=ROOM, folder=tmp_path), bus)
         key = keys.event(ROOM, "p01")
         sent = [event(i) for i in range(500)]
@@ -192,3 +192,12 @@ def test_a_second_recording_of_the_same_second_gets_the_next_name(
         "gym-2026-01-02T03-04-05Z-2.mcap",
         "gym-2026-01-02T03-04-05Z-3.mcap",
     ]
+
+
+def test_a_recording_that_another_recorder_still_writes_is_left_alone(tmp_path: Path) -> None:
+    with recording.RecordingWriter(tmp_path / "open.mcap") as writer:
+        for i in range(20):
+            writer.write(keys.event(ROOM, "p01"), event(i), i * 200_000_000)
+        assert recorder.recover_folder(tmp_path) == []
+        writer.write(keys.event(ROOM, "p01"), event(20), 20 * 200_000_000)
+    assert recording.counts(tmp_path / "open.mcap") == {keys.event(ROOM, "p01"): 21}

@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any, cast
 
 import pytest
 from hypothesis import HealthCheck, given, settings
@@ -267,11 +268,47 @@ def test_a_foreign_file_gives_one_clear_line(tmp_path: Path, content: bytes) -> 
 
 
 def test_an_mcap_file_of_another_program_is_refused_by_name(tmp_path: Path) -> None:
-    from mcap.writer import Writer
+    from mcap import writer
 
     with (tmp_path / "ros.mcap").open("wb") as file:
-        other = Writer(file)
+        other = cast(Any, writer.Writer)(file)
         other.start(profile="ros2")
         other.finish()
     with pytest.raises(recording.RecordingError, match=r"another program.*ros2"):
         recording.read(tmp_path / "ros.mcap")
+
+
+FULL = """
+import resource, signal, sys
+from pathlib import Path
+from brachium_wire import keys, recording
+signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, 20_000))
+written = 0
+try:
+    with recording.RecordingWriter(Path(sys.argv[1])) as writer:
+        for i in range(10_000):
+            writer.write(keys.imu("gym", "p01", "forearm_r"), b"%d" % i, 1_000_000_000 + i * 20_000_000)
+except OSError as error:
+    print(error.strerror)
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="limits of a process are POSIX")
+def test_a_full_disk_is_said_and_what_was_written_is_read(tmp_path: Path) -> None:
+    path = tmp_path / "full.mcap"
+    env = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
+    done = subprocess.run(
+        [sys.executable, "-c", FULL, str(path)],
+        env=env,
+        capture_output=True,
+        text=True,
+        timeout=30,
+        check=True,
+    )
+    assert done.stdout.strip() == "File too large"
+    payloads = [m.payload for m in recording.read(path)]
+    assert len(payloads) > 100
+    assert payloads == [b"%d" % i for i in range(len(payloads))]
+    assert recording.recover(path).recovered
+    assert [m.payload for m in recording.read(path)] == payloads

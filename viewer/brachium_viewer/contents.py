@@ -143,7 +143,7 @@ def angles_rad(skeletons: Iterable[Skeleton], names: Iterable[str]) -> Floats:
     """Return the named angles (n, k), NaN where a skeleton has none."""
     wanted = list(names)
     rows = [[s.angles.get(name, np.nan) for name in wanted] for s in skeletons]
-    return np.array(rows, dtype=np.float64).reshape(-1, len(wanted))
+    return np.array(rows, dtype=np.float64).reshape(len(rows), len(wanted))
 
 
 def positions_m(skeletons: Iterable[Skeleton], joint: str) -> Floats:

@@ -130,9 +130,9 @@ def _arm(arm: ArmContents) -> ArmFigures:
         for segment, pose in skeleton.segments.items():
             counts = quality.setdefault(segment, {})
             counts[pose.quality] = counts.get(pose.quality, 0) + 1
-    angles = {
-        name: f for name in _common(arm) if (f := error_figures(angle_error_deg(arm, name))) is not None
-    }
+    names = _common(arm)
+    errors = angle_errors_deg(arm, names)
+    angles = {n: f for n, e in zip(names, errors.T, strict=True) if (f := error_figures(e)) is not None}
     clinical = [angles[name].rmse for name in CLINICAL if name in angles]
     joints = dict.fromkeys(joint for skeleton in arm.true for joint in skeleton.positions)
     positions = {j: f for j in joints if (f := error_figures(position_error_mm(arm, j))) is not None}
@@ -164,11 +164,13 @@ def latencies_ms(arm: ArmContents) -> list[float]:
     return [latency for latency in found if latency >= 0.0]
 
 
-def angle_error_deg(arm: ArmContents, name: str) -> Floats:
-    """Return published minus true (n,), within half a turn; NaN before calibration and where assumed."""
-    true = true_at(arm, _unwrapped(_ordered(arm, c.angles_rad(arm.true, [name]))))
-    error = wrap_deg(np.degrees(c.angles_rad(arm.published, [name])[:, 0] - true[:, 0]))
-    error[~c.calibrated(arm.published) | ~measured(arm, name)] = np.nan
+def angle_errors_deg(arm: ArmContents, names: list[str]) -> Floats:
+    """Return published minus true (n, k), within half a turn; NaN before calibration and where assumed."""
+    true = true_at(arm, _unwrapped(_ordered(arm, c.angles_rad(arm.true, names))))
+    error = wrap_deg(np.degrees(c.angles_rad(arm.published, names) - true))
+    error[~c.calibrated(arm.published)] = np.nan
+    for i, name in enumerate(names):
+        error[~measured(arm, name), i] = np.nan
     return error
 
 
@@ -202,7 +204,8 @@ def _ordered(arm: ArmContents, values: Floats) -> Floats:
 
 
 def _unwrapped(angles: Floats) -> Floats:
-    """Return angles (m, 1) without jumps of a turn, so that what lies between two of them does."""
-    known = np.isfinite(angles[:, 0])
-    angles[known, 0] = np.unwrap(angles[known, 0])
+    """Return angles (m, k) without jumps of a turn, so that what lies between two of them does."""
+    for column in angles.T:
+        known = np.isfinite(column)
+        column[known] = np.unwrap(column[known])
     return angles
