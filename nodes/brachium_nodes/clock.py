@@ -32,7 +32,7 @@ _BUCKET_US = 50_000
 
 
 class NodeClock:
-    """Host time of one node. Feed it arrivals and exchanges; `host_ns` grows strictly with device time."""
+    """Host time of one node. Feed it arrivals and exchanges; Published times grow with device time."""
 
     def __init__(self) -> None:
         self._ups: deque[tuple[int, int]] = deque()
@@ -66,7 +66,7 @@ class NodeClock:
     @property
     def offset_ns(self) -> int:
         """Host time minus device time at the newest sample."""
-        return int(self.host_ns(np.array([self.newest_us]), keep=False)[0]) - self.newest_us * 1000
+        return int(self.host_ns(np.array([self.newest_us]))[0]) - self.newest_us * 1000
 
     def arrival(self, device_us: int, host_ns: int) -> None:
         """Take that a sample of device time `device_us` had arrived at `host_ns`."""
@@ -99,18 +99,16 @@ class NodeClock:
         self.arrival(left_us, answered_ns)
         return True
 
-    def host_ns(self, device_us: Integers, *, keep: bool = True) -> Integers:
-        """Return host times (n,) of device times (n,), strictly growing where these do.
-
-        With `keep`, these times count as published: later estimates join on to them.
-        """
+    def host_ns(self, device_us: Integers) -> Integers:
+        """Return host times (n,) of device times (n,), strictly growing where these do."""
         elapsed = (device_us - self._origin_us).astype(np.float64)
         fade = np.clip(1.0 - (device_us - self._correction_us) / self._correction_span_us, 0.0, 1.0)
         offset = self._intercept + self._slope * elapsed + self._correction_ns * fade
-        if keep:
-            newest = int(device_us[-1])
-            self._published_us = newest if self._published_us is None else max(newest, self._published_us)
         return device_us * 1000 + self._origin_ns + np.rint(offset).astype(np.int64)
+
+    def publish(self, device_us: int) -> None:
+        """Take that host times up to this device time are given away: later estimates join on to them."""
+        self._published_us = max(device_us, self._published_us or 0)
 
     def uncertainty_ns(self, device_us: int) -> int:
         """Return the half width within which the host time of `device_us` is believed to lie."""

@@ -4,13 +4,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
-import msgspec
-
 from brachium_nodes import node_frames as f
 from brachium_nodes.batch_blocks import MAX_DEVICE_US, Measured, measure
 from brachium_nodes.roster import Admission, Refusal
+from brachium_nodes.sample_stream import stamp
 from brachium_wire.codec import Drop, WireError, encode
-from brachium_wire.messages import Info, Message, SampleBatch, Status
+from brachium_wire.messages import Info, Message, Status
 
 HELLO_WITHIN_NS = 3_000_000_000
 STATUS_NS = 1_000_000_000
@@ -22,8 +21,6 @@ MAX_ASKED = 32
 HOLD_NS = 1_000_000_000
 """So long, batches wait for the first clock answer; then arrivals alone must tell the time."""
 MAX_HELD = 256
-MAX_AHEAD_NS = 1_000_000_000
-"""A sample this far in the future has a broken clock."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -216,47 +213,8 @@ class Conversation:
 
     def _publish(self, measured: Measured, received_ns: int) -> list[Action]:
         assert self.admission is not None
-        memory, place = self.admission.memory, self.admission.place
-        batch, clock = measured.batch, memory.clock
-        expected = memory.counter.next
-        in_order = not batch.late and (expected is None or batch.sequence >= expected)
-        if in_order and measured.device_us[0] <= memory.newest_us:
-            raise WireError(
-                Drop.TIME_BACKWARDS, f"batch/1: t {batch.device_us} is not after the sample before"
-            )
-        newest_us = int(measured.device_us[-1])
-        if not clock.known:
-            clock.arrival(newest_us, received_ns)
-        times = clock.host_ns(measured.device_us, keep=in_order)
-        if times[0] <= 0 or times[-1] > received_ns + clock.uncertainty_ns(newest_us) + MAX_AHEAD_NS:
-            raise WireError(Drop.OUT_OF_RANGE, f"batch/1: t {batch.device_us} lies in the future")
-        clock.arrival(newest_us, received_ns)
-        repeated = memory.counter.repeated
-        memory.counter.feed(batch.sequence, len(measured))
-        again = memory.counter.repeated - repeated
-        memory.drops.update({Drop.REPEATED.value: again} if again else {})
-        if again == len(measured):
-            return []
-        if batch.late:
-            memory.late += len(measured)
-        if memory.base is None:
-            memory.base = max(0, place.next_sequence - batch.sequence)
-        sequence = batch.sequence + memory.base
-        if in_order:
-            memory.newest_us = newest_us
-            times = times + max(
-                0, place.newest_ns + 1 - int(times[0])
-            )  # another node or boot was here before
-            place.newest_ns, place.next_sequence = int(times[-1]), sequence + len(measured)
-        shared: SampleBatch = msgspec.structs.replace(
-            batch,
-            sequence=sequence,
-            time_ns=int(times[0]),
-            offsets=(times - times[0]).astype("<u4").tobytes(),
-            received_ns=received_ns,
-            uncertainty_ns=clock.uncertainty_ns(newest_us),
-        )
-        return [Publish("imu", shared)]
+        batch = stamp(measured, self.admission.memory, self.admission.place, received_ns)
+        return [] if batch is None else [Publish("imu", batch)]
 
     def _ask(self, now_ns: int) -> Send:
         often = now_ns - self._since_ns < ASK_OFTEN_FOR_NS

@@ -3,7 +3,6 @@
 import asyncio
 import logging
 import secrets
-from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from math import ceil, inf
 from threading import Event
@@ -13,21 +12,14 @@ import numpy as np
 from brachium_body.continuation import AngleTracker
 from brachium_body.segments import Side
 from brachium_nodes.direct_node import DirectHost, DirectSink
+from brachium_nodes.emulated_nodes import alike, node_id, node_streams
 from brachium_nodes.gateway import token_sha256
 from brachium_nodes.host_claim import checked_host
-from brachium_nodes.link import EmulatedClock, FaultSettings
-from brachium_nodes.node_frames import Batch, Hello
-from brachium_nodes.node_stream import (
-    NodeStream,
-    Outgoing,
-    Sink,
-    SocketSink,
-    StreamCount,
-    Timeline,
-    send_streams,
-)
+from brachium_nodes.link import FaultSettings
+from brachium_nodes.node_stream import NodeStream, StreamCount, Timeline
 from brachium_nodes.roster import NodeEntry
-from brachium_nodes.wearer import Packet, Wearer, WearerSettings
+from brachium_nodes.sending import Sink, SocketSink, send_streams
+from brachium_nodes.wearer import Wearer, WearerSettings
 from brachium_wire import keys
 from brachium_wire.bus import DEFAULT_ENDPOINT, Bus
 from brachium_wire.codec import encode
@@ -61,6 +53,8 @@ class EmulateSettings:
     subject: str = "p01"
     wearers: int = 1
     """More than one: subjects p001, p002, ..., each with the next seed."""
+    alike: bool = False
+    """All wearers move as the first: a hundred cost little more than one."""
     wearer: WearerSettings = field(default_factory=WearerSettings)
     faults: FaultSettings = field(default_factory=FaultSettings)
     truth: bool = True
@@ -94,11 +88,6 @@ class EmulateReport:
     streams: dict[str, dict[str, StreamCount]]
 
 
-def node_id(subject: str, segment: str) -> str:
-    """Return the id under which an emulated segment joins."""
-    return f"emu-{subject}-{segment}"
-
-
 def node_entries(settings: EmulateSettings) -> tuple[NodeEntry, ...]:
     """Return what a gateway's table needs so that these wearers' nodes are let in."""
     wearer = Wearer(settings.wearer)
@@ -128,8 +117,9 @@ class _Emulation:
     def __init__(self, settings: EmulateSettings, bus: Bus, stop: Event) -> None:
         self._settings, self._bus, self._stop = settings, bus, stop
         self._timeline = Timeline(settings.speed)
+        step = 0 if settings.alike else 1
         self._wearers = {
-            subject: Wearer(replace(settings.wearer, seed=settings.wearer.seed + number))
+            subject: Wearer(replace(settings.wearer, seed=settings.wearer.seed + number * step))
             for number, subject in enumerate(settings.subjects())
         }
         self._direct: DirectHost | None = None
@@ -143,10 +133,18 @@ class _Emulation:
         settings = self._settings
         if settings.direct:
             self._direct = DirectHost(self._bus, settings.room, settings.id, self._timeline)
-        for subject, wearer in self._wearers.items():
-            streams = node_streams(subject, wearer, settings.faults)
-            self._nodes += [(stream, self._sink(stream)) for stream in streams]
-            if settings.session:
+        boot = secrets.randbits(32)
+        wearers = list(self._wearers.items())
+        streams = [
+            stream
+            for subject, wearer in wearers[: 1 if settings.alike else None]
+            for stream in node_streams(subject, wearer, settings.faults, boot)
+        ]
+        if settings.alike:
+            streams = alike(streams, settings.subjects())
+        self._nodes = [(stream, self._sink(stream)) for stream in streams]
+        if settings.session:
+            for subject, wearer in wearers:
                 self._bus.retain(keys.session(settings.room, subject), encode(session(wearer)))
         end_s = inf if settings.seconds is None else settings.seconds
         counts = await send_streams(self._nodes, self._timeline, end_s, self._stop, self._beside)
@@ -200,51 +198,3 @@ def session(wearer: Wearer) -> Session:
     """Return what a subject's session says of an emulated wearer."""
     person = wearer.settings
     return Session(side=person.arms, height_m=person.height_m, facing_deg=0.0, exercise=person.exercise)
-
-
-def node_streams(subject: str, wearer: Wearer, faults: FaultSettings) -> list[NodeStream]:
-    """Return the nodes of one wearer, as just switched on."""
-    streams = []
-    for segment in wearer.segments:
-        info, clock = wearer.info(segment), wearer.clocks[segment]
-        hello = Hello(
-            node=node_id(subject, segment),
-            boot=secrets.randbits(32),
-            chip=info.chip,
-            rate_hz=info.rate_hz,
-            firmware="emulated",
-            magnetometer=info.magnetometer,
-            calibration=info.calibration,
-            origin="emulated",
-        )
-        streams.append(
-            NodeStream(
-                subject=subject,
-                segment=segment,
-                hello=hello,
-                mounting=info.mounting,
-                packets=map(outgoing, wearer.packets(segment, faults)),
-                clock_us=_reader(clock),
-            )
-        )
-    return streams
-
-
-def _reader(clock: EmulatedClock) -> Callable[[float], int]:
-    return lambda time_s: int(clock.ticks_us(np.array([time_s]))[0])
-
-
-def outgoing(packet: Packet) -> Outgoing:
-    """Return a packet of the emulated wearer as the frame that its node sends."""
-    readings, ticks = packet.readings, packet.device_us
-    whole = len(readings.mag) == len(ticks)
-    batch = Batch(
-        sequence=packet.sequence,
-        device_us=int(ticks[0]),
-        offsets=(ticks - ticks[0]).astype("<u4").tobytes(),
-        acc=readings.acc.astype("<f4").tobytes(),
-        gyr=readings.gyr.astype("<f4").tobytes(),
-        mag=readings.mag.astype("<f4").tobytes() if len(readings.mag) else None,
-        mag_index=None if whole or not len(readings.mag) else readings.mag_index.astype("<u2").tobytes(),
-    )
-    return Outgoing(packet.send_time_s, batch, readings.time_s)

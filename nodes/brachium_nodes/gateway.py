@@ -6,15 +6,13 @@ import ipaddress
 import logging
 import threading
 from collections.abc import Callable
-from concurrent.futures import Future
-from concurrent.futures import TimeoutError as NoAnswer
 from dataclasses import dataclass
 from http import HTTPStatus
 
-import msgspec
 from websockets.asyncio.server import ServerConnection, serve
 from websockets.http11 import Request, Response
 
+from brachium_nodes.assign_command import serve_assign
 from brachium_nodes.connection import Connection
 from brachium_nodes.conversation import Conversation
 from brachium_nodes.host_claim import HostClaims, checked_host
@@ -22,10 +20,10 @@ from brachium_nodes.node_frames import MAX_FRAME_BYTES, Hello
 from brachium_nodes.roster import Admission, NodeEntry, Refusal, Roster
 from brachium_wire import keys
 from brachium_wire.bus import DEFAULT_ENDPOINT, Bus
-from brachium_wire.codec import WireError, decode, encode
+from brachium_wire.codec import encode
 from brachium_wire.heart import Heart
 from brachium_wire.hosttime import HostClock, tell_host_time
-from brachium_wire.messages import Answer, Command, Message, Quaternion, SampleBatch
+from brachium_wire.messages import Message, Quaternion, SampleBatch
 
 log = logging.getLogger(__name__)
 
@@ -68,7 +66,7 @@ def run(settings: GatewaySettings, stop: threading.Event) -> None:
 
 
 class Gateway:
-    """Joins connections, roster and bus. All runs on one event loop but `_assign`."""
+    """Joins connections, roster and bus. All of it runs on one event loop."""
 
     def __init__(self, bus: Bus, settings: GatewaySettings, roster: Roster) -> None:
         self._bus, self._settings, self._roster = bus, settings, roster
@@ -105,8 +103,7 @@ class Gateway:
             self._heart = Heart(self._bus, settings.room, "gateway", settings.id)
             self._heart.text = f"ws://{f'[{address}]' if ':' in address else address}:{port}{PATH}"
             tell_host_time(self._bus, settings.room, settings.id, self._clock.now_ns)
-            loop = asyncio.get_running_loop()
-            self._bus.serve(keys.commands(settings.room, "assign"), lambda k, q: self._assign(loop, k, q))
+            serve_assign(self._bus, settings.room, asyncio.get_running_loop(), self._assign)
             log.info("gateway %s takes nodes at %s", settings.id, self._heart.text)
             self._beat(now=True)
             while not stop.is_set():
@@ -201,46 +198,17 @@ class Gateway:
         self._heart.counts["nodes"] = len(self._connections)
         self._heart.beat(now=now)
 
-    def _assign(self, loop: asyncio.AbstractEventLoop, key: str, question: bytes) -> bytes:
-        """Answer `command/assign`, asked on one of Zenoh's threads."""
-        answer: Future[Answer] = Future()
-
-        def work() -> None:
-            answer.set_result(self._assigned(key, question))
-
-        try:
-            loop.call_soon_threadsafe(work)
-            return encode(answer.result(timeout=2.0))
-        except (RuntimeError, NoAnswer):
-            return encode(Answer(ok=False, reason="the gateway is ending"))
-
-    def _assigned(self, key: str, question: bytes) -> Answer:
-        try:
-            subject = keys.parse(key).subject
-            arguments = decode(question, Command, 65536).arguments
-            wanted = msgspec.convert(arguments, _Assign)
-        except (keys.BadKey, WireError, msgspec.ValidationError) as error:
-            return Answer(ok=False, reason=f"assign takes id, segment and perhaps mounting: {error}")
-        reason = self._roster.assign(wanted.id, subject, wanted.segment, wanted.mounting)
+    def _assign(self, node: str, subject: str, segment: str, mounting: Quaternion | None) -> str:
+        """Assign a node; return "" or the reason why not."""
+        reason = self._roster.assign(node, subject, segment, mounting)
         if reason:
-            return Answer(ok=False, reason=reason)
-        log.warning(
-            "node %s is now %s of %s; put it into the site file to keep it",
-            wanted.id,
-            wanted.segment,
-            subject,
-        )
-        connection = self._connections.get(wanted.id)
+            return reason
+        log.warning("node %s is now %s of %s; put it into the site file to keep it", node, segment, subject)
+        connection = self._connections.get(node)
         if connection is not None:
-            self._expel(connection, Refusal("reassigned", f"assigned to {wanted.segment} of {subject}", 0.0))
+            self._expel(connection, Refusal("reassigned", f"assigned to {segment} of {subject}", 0.0))
         self._beat(now=True)
-        return Answer(ok=True)
-
-
-class _Assign(msgspec.Struct):
-    id: str
-    segment: str
-    mounting: Quaternion | None = None
+        return ""
 
 
 def _presented(request: Request) -> str:

@@ -11,17 +11,11 @@ from threading import Event
 from brachium_nodes.direct_node import DirectHost, DirectSink
 from brachium_nodes.gateway import token_sha256
 from brachium_nodes.host_claim import checked_host
-from brachium_nodes.node_stream import (
-    NodeStream,
-    Sink,
-    SocketSink,
-    StreamCount,
-    Timeline,
-    send_streams,
-)
+from brachium_nodes.node_stream import NodeStream, StreamCount, Timeline
 from brachium_nodes.playback import Source, capture_source, recording_source
 from brachium_nodes.replay import replay
 from brachium_nodes.roster import NodeEntry
+from brachium_nodes.sending import Sink, SocketSink, send_streams
 from brachium_wire import capture, keys, recording
 from brachium_wire.bus import DEFAULT_ENDPOINT, Bus
 from brachium_wire.codec import encode

@@ -1,14 +1,12 @@
 """Who may join and for whom it stands. A value: no socket, no clock, no bus."""
 
 import hmac
-from collections import Counter
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
-from brachium_nodes.clock import NodeClock
 from brachium_nodes.node_frames import MAX_RATE_HZ, Hello, RefusalCode
+from brachium_nodes.sample_stream import Memory, SegmentMemory
 from brachium_wire import keys
 from brachium_wire.messages import Quaternion
-from brachium_wire.sequence import SequenceCounter
 
 MAX_WAITING = 64
 """Unknown nodes that are remembered; more than a room holds are not a mistake but an attack."""
@@ -25,29 +23,6 @@ class NodeEntry:
     segment: str | None = None
     mounting: Quaternion | None = None
     """Nominal segment_from_sensor."""
-
-
-@dataclass(slots=True)
-class Memory:
-    """What is kept of a node over its connections, as long as it does not restart."""
-
-    boot: int
-    counter: SequenceCounter = field(default_factory=SequenceCounter)
-    clock: NodeClock = field(default_factory=NodeClock)
-    drops: Counter[str] = field(default_factory=Counter)
-    late: int = 0
-    newest_us: int = -1
-    """Device time of the newest sample in order."""
-    base: int | None = None
-    """What is added to the node's numbers, so that the segment's go on when another node takes over."""
-
-
-@dataclass(slots=True)
-class SegmentMemory:
-    """What a segment's key has carried so far; numbers and times on it never go back."""
-
-    next_sequence: int = 0
-    newest_ns: int = 0
 
 
 @dataclass(frozen=True, slots=True)

@@ -70,6 +70,11 @@ def bus(endpoint: str) -> Iterator[Bus]:
         yield bus
 
 
+@pytest.fixture
+def waiting() -> Callable[[Callable[[], object], str], None]:
+    return until
+
+
 class Listener:
     """Everything that the room said since it was made."""
 

@@ -14,7 +14,7 @@ from brachium_nodes.node_client import NotWelcome
 from brachium_nodes.wearer import Wearer, WearerSettings
 from brachium_wire import keys
 from brachium_wire.codec import decode
-from brachium_wire.messages import Session
+from brachium_wire.messages import SampleBatch, Session
 from brachium_wire.samples import read_samples
 
 ROOM = "test"
@@ -109,6 +109,30 @@ def test_several_wearers_publish_directly_and_faster(listener, endpoint) -> None
     assert report.streams["p001"] != report.streams["p002"]  # other seeds, other faults
     topics = {k.topic for k, _ in listener.heard}
     assert {"session", "truth", "health"} <= topics
+
+
+@pytest.mark.network
+def test_wearers_that_move_alike_send_the_same_samples(listener, endpoint) -> None:
+    worn = WearerSettings(segments=("hand_r",))
+    settings = EmulateSettings(
+        endpoint=endpoint,
+        room=ROOM,
+        direct=True,
+        seconds=1.0,
+        wearers=3,
+        alike=True,
+        wearer=worn,
+        truth=False,
+    )
+    run(settings, threading.Event())
+    assert {k[0] for k in listener.until_gone(3)} == {"p001", "p002", "p003"}
+    sent: dict[str, list] = {}
+    for key, message in listener.heard:
+        if isinstance(message, SampleBatch):
+            sent.setdefault(key.subject, []).append((message.sequence, message.acc, message.time_ns))
+    assert sent["p001"] == sent["p002"] == sent["p003"]
+    assert len(sent["p001"]) >= 18
+    assert "truth" not in {k.topic for k, _ in listener.heard}
 
 
 @pytest.mark.network

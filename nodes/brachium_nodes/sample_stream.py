@@ -1,0 +1,89 @@
+"""From a node's numbers and clock to those of its segment on the bus: host times, and counts that go on."""
+
+from collections import Counter
+from dataclasses import dataclass, field
+
+import msgspec
+
+from brachium_nodes.batch_blocks import Measured
+from brachium_nodes.clock import NodeClock
+from brachium_wire.codec import Drop, WireError
+from brachium_wire.messages import SampleBatch
+from brachium_wire.sequence import SequenceCounter
+
+MAX_AHEAD_NS = 1_000_000_000
+"""A sample this far in the future has a broken clock."""
+
+
+@dataclass(slots=True)
+class Memory:
+    """What is kept of a node over its connections, as long as it does not restart."""
+
+    boot: int
+    counter: SequenceCounter = field(default_factory=SequenceCounter)
+    clock: NodeClock = field(default_factory=NodeClock)
+    drops: Counter[str] = field(default_factory=Counter)
+    late: int = 0
+    newest_us: int = -1
+    """Device time of the newest sample in order."""
+    base: int | None = None
+    """What is added to the node's numbers, so that the segment's go on when another node takes over."""
+
+
+@dataclass(slots=True)
+class SegmentMemory:
+    """What a segment's key has carried so far; numbers and times on it never go back."""
+
+    next_sequence: int = 0
+    newest_ns: int = 0
+
+
+def stamp(measured: Measured, memory: Memory, place: SegmentMemory, received_ns: int) -> SampleBatch | None:
+    """Return a batch with host times and the segment's numbers, and count it; None when all of it was here.
+
+    Raises WireError for times that cannot be: then nothing is counted.
+    """
+    batch, clock, newest_us = measured.batch, memory.clock, int(measured.device_us[-1])
+    expected = memory.counter.next
+    in_order = not batch.late and (expected is None or batch.sequence >= expected)
+    if in_order and measured.device_us[0] <= memory.newest_us:
+        raise WireError(Drop.TIME_BACKWARDS, f"batch/1: t {batch.device_us} is not after the sample before")
+    if not clock.known:
+        clock.arrival(newest_us, received_ns)
+    times = clock.host_ns(measured.device_us)
+    if times[0] <= 0 or times[-1] > received_ns + clock.uncertainty_ns(newest_us) + MAX_AHEAD_NS:
+        raise WireError(Drop.OUT_OF_RANGE, f"batch/1: t {batch.device_us} lies in the future")
+    if in_order:
+        clock.publish(newest_us)
+    clock.arrival(newest_us, received_ns)
+    if not _new(measured, memory):
+        return None
+    if memory.base is None:
+        memory.base = max(0, place.next_sequence - batch.sequence)
+    sequence = batch.sequence + memory.base
+    if in_order:
+        memory.newest_us = newest_us
+        times = times + max(0, place.newest_ns + 1 - int(times[0]))  # another node or boot was here before
+        place.newest_ns, place.next_sequence = int(times[-1]), sequence + len(measured)
+    return msgspec.structs.replace(
+        batch,
+        sequence=sequence,
+        time_ns=int(times[0]),
+        offsets=(times - times[0]).astype("<u4").tobytes(),
+        received_ns=received_ns,
+        uncertainty_ns=clock.uncertainty_ns(newest_us),
+    )
+
+
+def _new(measured: Measured, memory: Memory) -> bool:
+    """Count a batch; return whether anything in it is new."""
+    before = memory.counter.repeated
+    memory.counter.feed(measured.batch.sequence, len(measured))
+    again = memory.counter.repeated - before
+    if again:
+        memory.drops[Drop.REPEATED.value] += again
+    if again == len(measured):
+        return False
+    if measured.batch.late:
+        memory.late += len(measured)
+    return True
