@@ -24,7 +24,7 @@ from brachium_wire import keys
 from brachium_wire.bus import DEFAULT_ENDPOINT, Bus
 from brachium_wire.codec import encode
 from brachium_wire.heart import Heart
-from brachium_wire.hosttime import follow_host_time
+from brachium_wire.hosttime import NoHostTime, follow_host_time
 from brachium_wire.messages import Session
 
 log = logging.getLogger(__name__)
@@ -162,7 +162,11 @@ class _Emulation:
 
     async def _beside(self) -> None:
         """Publish truth and health while the nodes send."""
-        origin_ns = await asyncio.to_thread(self._origin_ns)
+        try:
+            origin_ns = await asyncio.to_thread(self._origin_ns)
+        except NoHostTime as error:
+            log.warning("no truth will be told: %s", error)
+            return
         tick = ceil(origin_ns / TRUTH_NS)
         while True:
             self._heart.beat()
@@ -184,7 +188,8 @@ class _Emulation:
         """Return host time at true time 0: the gateway's, for samples get theirs from it."""
         if self._direct is not None:
             return self._direct.origin_ns
-        host = next(sink.host for _, sink in self._nodes if isinstance(sink, SocketSink) and sink.host)
+        hosts = [sink.host for _, sink in self._nodes if isinstance(sink, SocketSink) and sink.host]
+        host = hosts[0] if hosts else "gateway"
         return follow_host_time(self._bus, self._settings.room, host).at(self._timeline.start_ns)
 
 

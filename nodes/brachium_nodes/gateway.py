@@ -132,7 +132,10 @@ class Gateway:
 
         conversation = Conversation(admit, self._settings.id, self._clock.now_ns())
         connection = Connection(socket, conversation, self._clock, self._publish, self._left)
-        await connection.run()
+        try:
+            await connection.run()
+        except Exception:  # the library's own log is silenced above
+            log.exception("a node's connection failed")
 
     def _admit(self, hello: Hello, token: str, connection: Connection) -> Admission | Refusal:
         subject = self._roster.subject_of(hello.node)

@@ -111,6 +111,7 @@ class NodeClient:
         except (ConnectionError, TimeoutError):
             pass
         await self.close()
+        self._socket = None
 
     async def closed(self) -> int:
         """Wait until the connection is closed; return the close code."""

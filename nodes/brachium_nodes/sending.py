@@ -104,6 +104,8 @@ async def send_streams(
         for task in joining:
             if task.done():
                 task.result()
+        if stop.is_set():
+            return {(stream.subject, stream.segment): StreamCount() for stream, _ in nodes}
         timeline.start()
         async with asyncio.TaskGroup() as group:
             beside = group.create_task(started())
@@ -116,8 +118,9 @@ async def send_streams(
     except ExceptionGroup as errors:
         raise errors.exceptions[0] from None
     finally:
-        for task in joining:
+        for task, (_, sink) in zip(joining, nodes, strict=True):
             task.cancel()
+            await sink.leave(0)  # nothing for those that left with their count
     return {(s.subject, s.segment): t.result() for (s, _), t in zip(nodes, sending, strict=True)}
 
 
