@@ -171,3 +171,20 @@ def test_the_figures_are_plain_json(tmp_path: Path) -> None:
     again = msgspec.json.decode(msgspec.json.encode(value))
     assert again["arms"]["p01/right"]["positions_mm"]["hand"]["n"] == 50
     assert again == value
+
+
+def test_held_and_missing_segments_say_nothing_of_calibration() -> None:
+    qualities: list[tuple[dict[str, Quality], bool]] = [
+        ({"hand_r": "missing"}, False),
+        ({"hand_r": "held"}, False),
+        ({"hand_r": "held", "forearm_r": "uncalibrated"}, False),
+        ({"hand_r": "held", "forearm_r": "missing"}, False),
+        ({"hand_r": "good", "forearm_r": "disturbed"}, True),
+        ({"hand_r": "held", "forearm_r": "missing"}, True),
+        ({"hand_r": "good", "forearm_r": "uncalibrated"}, False),
+    ]
+    skeletons = [
+        skeleton(T0, {}, 0.0, segments={name: SegmentPose(quality=q) for name, q in one.items()})
+        for one, _ in qualities
+    ]
+    assert contents.calibrated(skeletons).tolist() == [expected for _, expected in qualities]

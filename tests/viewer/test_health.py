@@ -152,6 +152,7 @@ def test_services_are_up_while_token_and_beat_are_there() -> None:
     )
     feed.put(keys.service(ROOM, "gateway", "g1"), health)
     feed.network.token(keys.alive(ROOM, "fusion", "main"), True)
+    feed.network.token(keys.alive(ROOM, "node", "esp-1"), True)
     report = feed.report(1.0)
     assert [(s.kind, s.up) for s in report.services] == [("fusion", True), ("gateway", True)]
     assert report.waiting == ["esp-1", "esp-2"]
@@ -183,8 +184,8 @@ def test_the_block_begins_with_the_count_and_says_what_to_do() -> None:
     assert lines[0] == "1 of 2 nodes live   [EMULATED: not worn by a person]"
     assert lines[1] == "waiting: esp-9   assign with: brachium gateway --assign esp-9=SUBJECT/SEGMENT"
     text = "\n".join(lines)
-    assert "p01/forearm_r          live" in text
-    assert "p01/hand_r             missing" in text
+    assert "p01/forearm_r    live     n-forearm_r" in text
+    assert "p01/hand_r       missing  n-hand_r" in text
     assert "100/100" in text
     assert "good: forearm_r" in text
     assert "services up: gateway/g1" in text

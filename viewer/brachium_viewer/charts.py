@@ -99,32 +99,46 @@ def line(
     axes.set_xlim(time[0], max(time[-1], time[0] + 1e-3))
     axes.set_ylabel(unit, color=QUIET, fontsize=7.5)
     axes.set_xlabel("s", color=QUIET, fontsize=7.5, labelpad=0)
-    low, high = axes.get_ylim()
+    low, high = _reach(time, measured, true, settled_s)
     if from_zero:
-        axes.set_ylim(0.0, max(high, 1.0))
+        low, high = 0.0, max(high, 1.0)
     elif high - low < 10.0:  # stillness is to look still
-        middle = (high + low) / 2
-        axes.set_ylim(middle - 5.0, middle + 5.0)
+        low, high = (low + high) / 2 - 5.0, (low + high) / 2 + 5.0
+    axes.set_ylim(low, high)
     return _svg(figure, name)
 
 
+def _reach(
+    time: Floats, measured: Floats, true: tuple[Floats, Floats] | None, settled_s: float | None
+) -> tuple[float, float]:
+    """Return the range to draw: that of the truth and of what is calibrated, when anything is."""
+    settled = measured if settled_s is None else measured[time >= settled_s]
+    shown = np.concatenate([settled if np.isfinite(settled).any() else measured, *(true or ())[1:]])
+    shown = shown[np.isfinite(shown)]
+    if not shown.size:
+        return 0.0, 1.0
+    low, high = float(shown.min()), float(shown.max())
+    margin = 0.06 * (high - low)
+    return low - margin, high + margin
+
+
 def histogram(name: str, values: Floats, unit: str, marks: Mapping[str, float]) -> str:
-    """Return a histogram with named marks; values beyond twice the last mark are gathered at its end."""
+    """Return a histogram with named marks; rare high values are gathered at its end, which is then marked."""
     figure, axes = _figure(3.65, 1.75)
-    end = max(2.0 * max(marks.values()), 1.0)
+    first, last = min(marks.values()), max(marks.values())
+    end = max(min(2.0 * last, 6.0 * first), 1.0)
     axes.hist(np.minimum(values, end), bins=np.linspace(0.0, end, 41).tolist(), color=MEASURED, alpha=0.85)
     top = 1.3 * axes.get_ylim()[1]  # the marks' names stand above the bars
     axes.set_ylim(0.0, top)
     for place, (mark, value) in enumerate(marks.items()):
-        axes.axvline(value, color=INK, linewidth=0.8, linestyle=(0, (3, 2)))
-        axes.text(
-            value + end * 0.012,
-            top * (0.96 - 0.12 * place),
-            f"{mark} {value:.1f}",
-            fontsize=7.5,
-            color=INK,
-            va="top",
-        )
+        label, height = f"{mark} {value:.1f}", top * (0.96 - 0.12 * place)
+        if value < end:
+            axes.axvline(value, color=INK, linewidth=0.8, linestyle=(0, (3, 2)))
+            axes.text(value + end * 0.012, height, label, fontsize=7.5, color=INK, va="top")
+        else:
+            axes.text(
+                end, height, f"{label} \N{RIGHTWARDS ARROW}", fontsize=7.5, color=INK, va="top", ha="right"
+            )
     axes.set_xlim(0.0, end)
     axes.set_xlabel(unit, color=QUIET, fontsize=7.5, labelpad=1)
     axes.set_ylabel("skeletons", color=QUIET, fontsize=7.5)

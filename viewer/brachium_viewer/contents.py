@@ -153,14 +153,17 @@ def positions_m(skeletons: Iterable[Skeleton], joint: str) -> Floats:
 
 
 def calibrated(skeletons: Iterable[Skeleton]) -> npt.NDArray[np.bool_]:
-    """Return where a skeleton has segments and none of them is uncalibrated (n,)."""
-    return np.array(
-        [
-            bool(s.segments) and all(p.quality != "uncalibrated" for p in s.segments.values())
-            for s in skeletons
-        ],
-        dtype=np.bool_,
-    )
+    """Return which skeletons (n,), in order, are of calibrated sensors.
+
+    One of whose segments all are held or missing is what the one before it was; the first is not calibrated.
+    """
+    found, state = [], False
+    for skeleton in skeletons:
+        qualities = {pose.quality for pose in skeleton.segments.values()} - {"held", "missing"}
+        if qualities:
+            state = "uncalibrated" not in qualities
+        found.append(state)
+    return np.array(found, dtype=np.bool_)
 
 
 def outwards(item: tuple[Who, object]) -> tuple[str, int]:

@@ -11,6 +11,9 @@ from brachium_wire.messages import Health, Info, SampleBatch, Skeleton, Status
 from brachium_wire.sequence import SequenceCounter
 from brachium_wire.topics import TOPICS
 
+_NO_SERVICES = ("node", "host")
+"""Tokens of sensors, which are shown as nodes, and of the claim on a subject's host time."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class NodeHealth:
@@ -134,8 +137,8 @@ class Network:
             parsed = keys.parse(key)
         except keys.BadKey:
             return
-        if parsed.topic == "alive":
-            kind, _, name = parsed.detail.partition("/")
+        kind, _, name = parsed.detail.partition("/")
+        if parsed.topic == "alive" and kind not in _NO_SERVICES:
             self._services.setdefault((kind, name), _Service()).token = alive
 
     def report(self, now_ns: int) -> NetworkHealth:

@@ -73,10 +73,19 @@ def block(health: NetworkHealth, *, colour: bool = False) -> str:
     lines = [health.headline + _unworn(health)]
     for name in health.waiting:
         lines.append(f"waiting: {name}   assign with: brachium gateway --assign {name}=SUBJECT/SEGMENT")
-    if health.nodes:
-        lines += ["", _row(_NODE_HEAD)] + [_paint(_row(_node(n)), n.state, colour) for n in health.nodes]
-    if health.arms:
-        lines += ["", _row(_ARM_HEAD)] + [_paint(_row(_arm(a)), a.state, colour) for a in health.arms]
+    for head, rows in (
+        (_NODE_HEAD, [(_node(n), n.state) for n in health.nodes]),
+        (_ARM_HEAD, [(_arm(a), a.state) for a in health.arms]),
+    ):
+        if rows:
+            widths = [
+                max(map(len, column)) for column in zip(head, *(cells for cells, _ in rows), strict=True)
+            ]
+            lines += [
+                "",
+                _row(head, widths),
+                *(_paint(_row(cells, widths), state, colour) for cells, state in rows),
+            ]
     if health.services:
         up = [f"{s.kind}/{s.id}" for s in health.services if s.up]
         down = [f"{s.kind}/{s.id}" for s in health.services if not s.up]
@@ -117,12 +126,18 @@ _NODE_HEAD = (
     "dBm",
     "clock ms",
 )
+_WORDS = 3
+"""The first columns of both tables are words."""
 _ARM_HEAD = ("subject/arm", "state", "forward", "rate Hz", "p50 ms", "p99 ms", "quality")
 
 
-def _row(cells: tuple[str, ...]) -> str:
-    first, second, third, *rest = cells
-    return (f"{first:<22} {second:<8} {third:<10} " + " ".join(f"{cell:>8}" for cell in rest)).rstrip()
+def _row(cells: tuple[str, ...], widths: list[int]) -> str:
+    """Return words to the left, figures to the right."""
+    padded = [
+        cell.ljust(width) if i < _WORDS or i == len(cells) - 1 else cell.rjust(width)
+        for i, (cell, width) in enumerate(zip(cells, widths, strict=True))
+    ]
+    return "  ".join(padded).rstrip()
 
 
 def _paint(line: str, state: str, colour: bool) -> str:
