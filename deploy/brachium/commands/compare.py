@@ -15,9 +15,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
     """Add the options."""
     parser.add_argument("a", type=Path, metavar="A", help="a result (.csv or .parquet), as solve writes it")
     parser.add_argument("b", type=Path, metavar="B", help="another, or a reference, as a truth.parquet")
-    parser.add_argument(
-        "--lag", help="seconds A is late, or: estimate (default: as B's capture says)"
-    )
+    parser.add_argument("--lag", help="seconds A is late, or: estimate (default: as B's capture says)")
     parser.add_argument("--mask", metavar="COLUMN", help="of B; only rows count where it is true")
     parser.add_argument("--from", dest="from_s", type=float, metavar="S", help="only from this time of B on")
     parser.add_argument("--to", dest="to_s", type=float, metavar="S", help="only up to this time of B")

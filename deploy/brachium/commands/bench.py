@@ -1,0 +1,73 @@
+"""Measure this machine: what one arm costs, how late its skeletons are, what a hundred arms cost.
+
+brachium bench --quick
+"""
+
+import argparse
+import sys
+from dataclasses import asdict
+from typing import Any
+
+from brachium.shell import add_json, print_json
+
+WINDOW_S, QUICK_WINDOW_S = 6.0, 1.0
+
+
+def configure(parser: argparse.ArgumentParser) -> None:
+    """Add the options."""
+    parser.add_argument("--quick", action="store_true", help="short windows: a look, not a figure")
+    parser.add_argument("--arms", type=int, default=100, help="how many arms are many; 0 leaves them out")
+    add_json(parser)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Measure, one network after the other."""
+    figures = measure(QUICK_WINDOW_S if args.quick else WINDOW_S, args.arms)
+    if args.json:
+        print_json(figures)
+    else:
+        print(text(figures))
+    return 0
+
+
+def measure(window_s: float, arms: int) -> dict[str, Any]:
+    """Return all figures: one arm by samples a packet, and many arms."""
+    from brachium import bench
+
+    one = {}
+    for batch in (5, 1, 10):
+        print(f"one arm, {batch} samples a packet ...", file=sys.stderr, flush=True)
+        one[str(batch)] = asdict(bench.one_arm(batch, window_s))
+    if not arms:
+        return {"one_arm": one}
+    print(f"{arms} arms ...", file=sys.stderr, flush=True)
+    return {"one_arm": one, "many_arms": asdict(bench.many_arms(arms, window_s))}
+
+
+def text(figures: dict[str, Any]) -> str:
+    """Return the figures for a person."""
+    lines = ["one arm, three nodes at 100 Hz through the gateway", ""]
+    lines.append(f"{'samples a packet':<44}" + "".join(f"{batch:>10}" for batch in figures["one_arm"]))
+    rows = {
+        "first_skeleton_s": ("from start to first skeleton, s", 1.0),
+        "fusion_cpu": ("fusion, % of a core", 100.0),
+        "relay_cpu": ("a bare relay of the same batches, % of a core", 100.0),
+        "latency_p50_ms": ("gateway to skeleton, median ms", 1.0),
+        "latency_p99_ms": ("gateway to skeleton, 99 % ms", 1.0),
+        "sensor_to_skeleton_p50_ms": ("sensor to skeleton, median ms", 1.0),
+        "sensor_to_skeleton_p99_ms": ("sensor to skeleton, 99 % ms", 1.0),
+    }
+    for name, (label, factor) in rows.items():
+        values = [factor * one[name] for one in figures["one_arm"].values()]
+        lines.append(f"{label:<44}" + "".join(f"{value:>10.1f}" for value in values))
+    many = figures.get("many_arms")
+    if many is not None:
+        lines += ["", f"{many['arms']} arms, 5 samples a packet, straight to the bus", ""]
+        lines.append(f"{'fusion, % of a core':<44}{100.0 * many['fusion_cpu']:>10.1f}")
+        lines.append(f"{'a bare relay of the same batches':<44}{100.0 * many['relay_cpu']:>10.1f}")
+        lines.append(f"{'skeletons':<44}{many['skeletons']:>10}")
+        lines.append(f"{'ticks without one':<44}{many['skeletons_missing']:>10}")
+        lines.append(f"{'poses held or missing':<44}{many['poses_not_measured']:>10}")
+        lines.append(f"{'dropped by fusion':<44}{sum(many['fusion_drops'].values()):>10}")
+        lines.append(f"{'sender late by at most, ms':<44}{many['sender_late_ms']:>10.1f}")
+    return "\n".join(lines)
