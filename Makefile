@@ -50,9 +50,8 @@ lock:
 	build/lock/bin/uv pip compile $(LOCK) pyproject.toml --extra demo --group build -o requirements/demo.txt
 	build/lock/bin/uv pip compile $(LOCK) pyproject.toml --extra demo --extra can --group dev -o requirements/dev.txt
 
-# One lock for CPython 3.11 and later on every platform, the public index's hashes, no index address.
-LOCK := -q --no-config --universal --python-version 3.11 --generate-hashes --no-emit-index-url --no-header \
-	--default-index https://pypi.org/simple --upgrade
+# One lock for CPython 3.11 and later on every platform, the public index's hashes, no address.
+LOCK := -q --no-config --universal --python-version 3.11 --generate-hashes --no-emit-index-url --no-header --upgrade
 
 $(VENV)/python.stamp:
 	@test -n "$(PYTHON)" || { echo "Brachium needs Python 3.11 or later; none was found. Set PYTHON=/path/to/python3"; exit 1; }
