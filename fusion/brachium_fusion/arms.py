@@ -6,6 +6,7 @@ go; the memory takes each arm's rows one after another.
 """
 
 from collections.abc import Sequence
+from dataclasses import fields
 from functools import lru_cache
 from math import radians
 from typing import Any, NamedTuple
@@ -181,6 +182,14 @@ def _frame(subject: Subject, instant: Instant, side: Side) -> _Frame:
 def lengths_of(session: Session) -> ArmLengths:
     """Return the arm lengths a session states, completed from height."""
     return from_measured(session.lengths_m, session.height_m or DEFAULT_HEIGHT_M)
+
+
+def check_session(session: Session) -> None:
+    """Raise ValueError naming what of a session no arm has, or what nobody can use."""
+    lengths_of(session)
+    unknown = sorted(set(session.assumed_angles_deg) - {f.name for f in fields(StatedAngles)})
+    if unknown:
+        raise ValueError(f"assumed_angles_deg cannot use {unknown[0]!r}")
 
 
 def _facing(session: Session, subject: Subject) -> Floats:

@@ -7,6 +7,7 @@ would have given.
 """
 
 from collections.abc import Iterable
+from contextlib import suppress
 from dataclasses import dataclass, field
 
 from brachium_fusion.pipeline import Pipeline, Solved
@@ -73,7 +74,8 @@ def solve(subject: str, contents: Contents, settings: Settings) -> tuple[Pipelin
         known = begun.pending()
         changes = [c for c in changes if c.from_ns >= begun.next_tick_ns() and c not in known]
     for change in changes:
-        pipeline.apply(subject, change)
+        with suppress(ValueError):  # not by this fusion: live, nothing of the kind was applied
+            pipeline.apply(subject, change)
     solved: list[Solved] = []
     for first in range(0, len(contents.samples), DRAIN):
         pipeline.feed_all(contents.samples[first : first + DRAIN])

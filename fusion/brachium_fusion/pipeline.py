@@ -14,12 +14,13 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import msgpack
+import msgspec
 
-from brachium_fusion.arms import Arms, Row, rows_of
-from brachium_fusion.subject import Change, Settings, Subject
+from brachium_fusion.arms import Arms, Row, check_session, rows_of
+from brachium_fusion.subject import Change, Settings, Subject, checked_wish
 from brachium_wire import keys
 from brachium_wire.codec import WireError, decode_batch, decode_topic, encode
-from brachium_wire.messages import Calibration, Info, SampleBatch, Skeleton, Snapshot
+from brachium_wire.messages import Calibration, Info, SampleBatch, Session, Skeleton, Snapshot
 from brachium_wire.samples import Samples, read_many
 from brachium_wire.topics import TOPICS
 
@@ -90,7 +91,19 @@ class Pipeline:
         self._collect(subject_id, subject)
 
     def apply(self, subject_id: str, change: Change) -> None:
-        """Take a change of a subject's session, or the wish for a calibration."""
+        """Take a change of a subject's session, or the wish for a calibration.
+
+        Raises ValueError for one that cannot be applied, before it can disturb anything.
+        """
+        if change.kind == "session":
+            try:
+                check_session(msgspec.convert(change.data, Session))
+            except msgspec.ValidationError as error:
+                raise ValueError(f"session: {error}") from None
+        elif change.kind == "calibrate":
+            checked_wish(change.data)
+        else:
+            raise ValueError(f"change {change.kind!r} is not known; changes are session and calibrate")
         self.subject(subject_id).apply(change)
 
     def finish(self) -> None:

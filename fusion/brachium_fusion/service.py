@@ -1,5 +1,6 @@
 """The live fusion service: bus -> pipeline -> bus. All decisions are the pipeline's; this only carries."""
 
+import gc
 import logging
 import threading
 import time
@@ -11,8 +12,7 @@ from typing import Any
 import msgspec
 
 from brachium_fusion.pipeline import Pipeline
-from brachium_fusion.pose import POSES, pose_orientations
-from brachium_fusion.subject import POSE_PATIENCE_S, STILL_S, Change, Settings
+from brachium_fusion.subject import POSE_PATIENCE_S, Change, Settings, checked_wish
 from brachium_wire import keys
 from brachium_wire.bus import DEFAULT_ENDPOINT, Bus, Inbox
 from brachium_wire.codec import Drop, WireError, decode, decode_topic, encode
@@ -26,6 +26,9 @@ MOST_DRAIN_S = 0.04
 DRAIN_S_PER_SUBJECT = 0.0004
 """How often arrivals are taken. For few subjects every 10 ms, of which a skeleton waits half on average. For
 a hundred every 40 ms, because a round of kinematics costs about a millisecond whatever is in it."""
+
+GC_ALLOCATIONS = 20_000
+"""Python's 700 would look for cycles, of which messages make none, a hundred times a second."""
 
 Reply = Callable[[bytes], None]
 
@@ -44,6 +47,9 @@ def run(settings: FuseSettings, stop: threading.Event) -> None:
     """Serve until `stop` is set."""
     with Bus.open(settings.endpoint, stop=stop, timeout_s=None) as bus:
         service = FusionService(bus, settings)
+        # What was made up to here stays; what comes after is mostly messages that live for a turn.
+        gc.freeze()
+        gc.set_threshold(GC_ALLOCATIONS)
         while not stop.wait(service.pause_s()):
             service.turn()
         service.close()
@@ -113,7 +119,11 @@ class FusionService:
         except WireError as error:
             self._door[error.drop.value] += 1
         else:
-            self._apply(subject, "session", msgspec.to_builtins(session))
+            try:
+                self._apply(subject, "session", msgspec.to_builtins(session))
+            except ValueError as error:
+                log.warning("%s: session left aside: %s", subject, error)
+                self._door[Drop.OUT_OF_RANGE.value] += 1
 
     def _publish(self) -> None:
         for solved in self._pipeline.skeletons():
@@ -154,7 +164,7 @@ class FusionService:
             reply(encode(Answer(ok=False, reason=str(error))))
 
     def _begin_calibration(self, subject: str, command: Command, reply: Reply) -> None:
-        wish = _wish(command)
+        wish = checked_wish(command.arguments)
         self._waiting.setdefault(subject, []).append(
             (time.monotonic() + wish["seconds"] + POSE_PATIENCE_S + 5, reply)
         )
@@ -200,22 +210,3 @@ class FusionService:
         if self._inbox.dropped:
             heart.drops["inbox_overflow"] = self._inbox.dropped
         heart.beat(now=now)
-
-
-def _wish(command: Command) -> dict[str, Any]:
-    """Return the checked arguments of `calibrate`, or raise ValueError saying what may be asked."""
-    arguments = dict(command.arguments)
-    pose, seconds = arguments.pop("pose", "n-pose"), arguments.pop("seconds", STILL_S)
-    angles = arguments.pop("angles_deg", {})
-    if arguments:
-        raise ValueError(
-            f"calibrate does not know {sorted(arguments)[0]!r}; it takes pose, seconds, angles_deg"
-        )
-    if pose not in POSES:
-        raise ValueError(f"pose {pose!r} is not known; poses are {', '.join(POSES)}")
-    if not isinstance(seconds, int | float) or not 1.0 <= seconds <= 30.0:
-        raise ValueError(f"seconds must be 1 to 30, not {seconds!r}")
-    if not isinstance(angles, dict):
-        raise ValueError("angles_deg must be a map from an angle's name to degrees")
-    pose_orientations(pose, angles)
-    return {"pose": pose, "seconds": float(seconds), "angles_deg": angles}

@@ -6,7 +6,7 @@ changes stamped with the instant from which they hold. So a recording of them gi
 
 from collections import Counter, deque
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
 import msgspec
@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from brachium_body.segments import SEGMENTS, Side
 from brachium_fusion.orientation import FilterName
-from brachium_fusion.pose import Alignment, PoseName, PoseSensor, align, pose_orientations
+from brachium_fusion.pose import POSES, Alignment, PoseName, PoseSensor, align, pose_orientations
 from brachium_fusion.track import Reading, SegmentTrack
 from brachium_wire.codec import Drop
 from brachium_wire.messages import Calibration, Info, Session
@@ -96,6 +96,9 @@ class Subject:
         self._ended = False
         self._pending: list[Change] = []
         self._unclaimed: dict[str, deque[Samples]] = {}
+        self._refused: dict[str, Info] = {}
+        """What a second host said, for when the first is gone."""
+        self._done_ns = 0
         self._host: str | None = None
         self._pose: _Pose | None = _Pose() if settings.auto_pose else None
         self._held: dict[str, list[tuple[int, Floats]]] = {}
@@ -119,28 +122,51 @@ class Subject:
             self.drops[Drop.UNKNOWN_SEGMENT.value] += 1
             return
         if self._host is not None and info.host != self._host:
-            if not self._host_is_gone():
-                self.drops[Drop.SECOND_HOST.value] += 1
-                return
-            self.tracks.clear()
-            self._next_ns = None
+            self.drops[Drop.SECOND_HOST.value] += 1
+            if any(other.host != info.host for other in self._refused.values()):
+                self._refused.clear()
+            self._refused[segment] = info
+            return
         self._host = info.host
         track = self.tracks.get(segment)
         if track is not None and track.info == info:
             return
+        if track is not None:
+            self._lose(segment, mounting=track.info.node != info.node)
         self.tracks[segment] = SegmentTrack(info, self._settings.filter, self._settings.magnetometer)
         self._held.pop(segment, None)
         self.revision += 1
         for samples in self._unclaimed.pop(segment, ()):
             self.feed(segment, samples)
 
-    def _host_is_gone(self) -> bool:
-        return not self.tracks or all(
-            self.received_ns - track.last_ns > HOST_GONE_NS for track in self.tracks.values()
-        )
+    def _lose(self, segment: str, *, mounting: bool) -> None:
+        """Forget how a new sensor is mounted; doubt the heading of one whose filter began anew."""
+        track, known = self.tracks[segment], self.alignment
+        if known is None or segment not in known.mounting:
+            return
+        if mounting:
+            rest = {s: q for s, q in known.mounting.items() if s != segment}
+            self.alignment = replace(known, mounting=rest)
+        elif not track.magnetometer and not track.info.orientation_only:
+            self.alignment = replace(known, assumed=known.assumed | {segment})
+        self.revision += 1
+
+    def _take_over(self, now_ns: int) -> None:
+        """Let the second host in, once nothing came from the first for long."""
+        if any(now_ns - track.last_ns <= HOST_GONE_NS for track in self.tracks.values()):
+            return
+        refused, self._refused = self._refused, {}
+        for segment in list(self.tracks):
+            self._lose(segment, mounting=segment not in refused)
+        self.tracks.clear()
+        self._host, self._next_ns, self.received_ns = None, None, 0
+        for segment, info in refused.items():
+            self.inform(segment, info)
 
     def feed(self, segment: str, samples: Samples) -> None:
         """Take a batch of samples of one segment."""
+        if self._refused:
+            self._take_over(samples.received_ns)
         track = self.tracks.get(segment)
         if track is None:
             if segment not in SEGMENTS:
@@ -151,9 +177,14 @@ class Subject:
                 self.drops[Drop.NO_INFO.value] += len(waiting[0])
             waiting.append(samples)
             return
+        restarts = track.restarts
+        if not track.feed(samples, self.drops):
+            return
         self.received_ns = max(self.received_ns, samples.received_ns)
-        if track.feed(samples, self.drops) and self._next_ns is None:
+        if self._next_ns is None:
             self._next_ns = self._first_tick(track.first_ns)
+        if track.restarts != restarts:
+            self._lose(segment, mounting=False)
 
     def apply(self, change: Change) -> None:
         """Take a change that holds from `change.from_ns` on."""
@@ -180,15 +211,15 @@ class Subject:
 
     def instants(self) -> Iterator[Instant]:
         """Yield every instant that can be solved now, in order."""
-        while self._next_ns is not None:
-            now = self._next_ns
+        solved = None
+        while (now := self._next_ns) is not None:
             readings = self._readings(now)
             if readings is None:
-                return
+                break
             if not any(readings.values()):
                 self._next_ns = self._skip(now)
                 continue
-            self._next_ns = self._following(now)
+            self._next_ns, self._done_ns = self._following(now), now
             self._apply_pending(now)
             self._watch_pose(now, readings)
             yield Instant(
@@ -198,8 +229,10 @@ class Subject:
                 self.alignment,
                 self.session,
             )
+            solved = now
+        if solved is not None:
             for track in self.tracks.values():
-                track.forget(self._next_ns or now)
+                track.forget(self._next_ns or solved)
 
     def _readings(self, now: int) -> dict[str, Reading | None] | None:
         """Return every segment's orientation, or None while one that is alive has not come so far."""
@@ -226,7 +259,7 @@ class Subject:
 
     def _first_tick(self, time_ns: int) -> int | None:
         if self._times is None:
-            return -(-time_ns // self._period_ns) * self._period_ns
+            return -(-max(time_ns, self._done_ns + 1) // self._period_ns) * self._period_ns
         return self._following(0)
 
     def _following(self, now: int) -> int | None:
@@ -338,6 +371,9 @@ class Subject:
         """Return all that changes, as plain values."""
         return {
             "next_ns": self._next_ns,
+            "done_ns": self._done_ns,
+            "refused": {s: msgspec.to_builtins(info) for s, info in self._refused.items()},
+            "unclaimed": {s: [_plain(b) for b in batches] for s, batches in self._unclaimed.items()},
             "host": self._host,
             "pending": [[c.from_ns, c.kind, c.data] for c in self._pending],
             "pose": None if self._pose is None else msgspec.to_builtins(self._pose),
@@ -352,6 +388,12 @@ class Subject:
     def restore(self, state: dict[str, Any]) -> None:
         """Go on as the subject whose state this is would have."""
         self._next_ns, self._host = state["next_ns"], state["host"]
+        self._done_ns = state["done_ns"]
+        self._refused = {s: msgspec.convert(info, Info) for s, info in state["refused"].items()}
+        self._unclaimed = {
+            s: deque((_samples(b) for b in batches), WAITING_BATCHES)
+            for s, batches in state["unclaimed"].items()
+        }
         self._pending = [Change(*c) for c in state["pending"]]
         self._pose = None if state["pose"] is None else _Pose(**state["pose"])
         self._held = {s: [(t, np.array(q)) for t, q in rows] for s, rows in state["held"].items()}
@@ -367,6 +409,37 @@ class Subject:
         self.reference_ns = state["reference_ns"]
         self.session = msgspec.convert(state["session"], Session)
         self.revision += 1
+
+
+def checked_wish(arguments: dict[str, Any]) -> dict[str, Any]:
+    """Return the arguments of `calibrate`, complete, or raise ValueError saying what may be asked."""
+    wish = {"pose": "n-pose", "seconds": STILL_S, "angles_deg": {}} | arguments
+    pose, seconds, angles = wish["pose"], wish["seconds"], wish["angles_deg"]
+    if len(wish) > 3:
+        unknown = sorted(set(wish) - {"pose", "seconds", "angles_deg"})[0]
+        raise ValueError(f"calibrate does not know {unknown!r}; it takes pose, seconds, angles_deg")
+    if pose not in POSES:
+        raise ValueError(f"calibrate: pose {pose!r} is not known; poses are {', '.join(POSES)}")
+    if not isinstance(seconds, int | float) or not 1.0 <= seconds <= 30.0:
+        raise ValueError(f"calibrate: seconds must be 1 to 30, not {seconds!r}")
+    if not isinstance(angles, dict) or not all(isinstance(v, int | float) for v in angles.values()):
+        raise ValueError("calibrate: angles_deg must be a map from an angle's name to degrees")
+    pose_orientations(pose, angles)
+    return {"pose": pose, "seconds": float(seconds), "angles_deg": angles}
+
+
+_BLOCKS = ("acc", "gyr", "mag", "quat")
+
+
+def _plain(samples: Samples) -> dict[str, Any]:
+    plain = msgspec.structs.asdict(samples)
+    return plain | {b: None if plain[b] is None else plain[b].tolist() for b in _BLOCKS}
+
+
+def _samples(plain: dict[str, Any]) -> Samples:
+    index = plain["mag_index"]
+    blocks = {b: _array(plain[b]) for b in _BLOCKS}
+    return Samples(**{**plain, **blocks, "mag_index": None if index is None else tuple(index)})
 
 
 def _array(values: Sequence[float] | None) -> Floats | None:

@@ -21,6 +21,8 @@ BRIDGE_NS = 100_000_000
 """A gap up to this is bridged by interpolation when its far end is there, and marked held."""
 RESTART_NS = 1_000_000_000
 """After a longer gap the filter starts anew: what it would carry over is further off than a fresh start."""
+AHEAD_NS = 1_000_000_000
+"""A sample cannot be from later than its arrival; one that claims more than this would end the stream."""
 STILL_RAD_S = 0.15
 """A sensor turning slower than this is still: above hand tremor and sway, far below any movement."""
 DISTURBED_NS = 2_000_000_000
@@ -40,15 +42,17 @@ class Reading(NamedTuple):
 
 @dataclass(slots=True, eq=False)
 class _Block:
-    """A batch after the filter. Row 0 repeats the last sample before it."""
+    """A batch after the filter, and the last sample before it."""
 
+    before_ns: int
+    """0 when there is none."""
+    before: Floats
     times: list[int]
     quats: Floats
     first_sequence: int
     received_ns: int
     gap: Quality | None
-    """What an instant between row 0 and the first new sample is: held, missing, or None where there is no
-    gap."""
+    """What an instant before its first sample is: held, missing, or None where there is no gap."""
     disturbed: bool
 
 
@@ -89,6 +93,9 @@ class SegmentTrack:
         n = len(samples)
         if samples.late:
             drops[Drop.LATE.value] += n
+            return False
+        if samples.time_ns[-1] > samples.received_ns + samples.uncertainty_ns + AHEAD_NS:
+            drops[Drop.OUT_OF_RANGE.value] += n
             return False
         counter = self.counter
         if samples.time_ns[0] <= self.last_ns and samples.sequence >= (counter.next or 0):
@@ -163,6 +170,10 @@ class SegmentTrack:
     def _note_still(self, gyr: Floats, times: list[int]) -> None:
         if self.still_since_ns == 0:
             self.still_since_ns = times[0]
+        x, y, z = gyr[-1].tolist()
+        if x * x + y * y + z * z > STILL_RAD_S**2:  # while an arm moves, its last sample tells
+            self.still_since_ns = times[-1] + 1
+            return
         squared = np.einsum("ij,ij->i", gyr, gyr).tolist()
         for i in range(len(squared) - 1, -1, -1):
             if squared[i] > STILL_RAD_S**2:
@@ -178,18 +189,27 @@ class SegmentTrack:
         return now_ns - self._disturbed_since >= DISTURBED_NS
 
     def _append(self, samples: Samples, quats: Floats, gap: Quality | None, disturbed: bool) -> None:
+        before_ns, before = 0, quats[0]
         if self._blocks:
             last = self._blocks[-1]
-            times = [last.times[-1], *samples.time_ns]
-            rows = np.concatenate([last.quats[-1:], quats])
-        else:
-            times, rows = [samples.time_ns[0], *samples.time_ns], np.concatenate([quats[:1], quats])
-        self._blocks.append(_Block(times, rows, samples.sequence, samples.received_ns, gap, disturbed))
+            before_ns, before = last.times[-1], last.quats[-1]
+        self._blocks.append(
+            _Block(
+                before_ns,
+                before,
+                samples.time_ns,
+                quats,
+                samples.sequence,
+                samples.received_ns,
+                gap,
+                disturbed,
+            )
+        )
 
     @property
     def first_ns(self) -> int:
         """Host time of the oldest sample still held; 0 before any."""
-        return self._blocks[0].times[1] if self._blocks else 0
+        return self._blocks[0].times[0] if self._blocks else 0
 
     def at(self, time_ns: int) -> Reading | None:
         """Return the orientation at an instant up to `last_ns`, or None where nothing was measured."""
@@ -198,23 +218,24 @@ class SegmentTrack:
                 break
         else:
             return None
-        after = max(bisect_left(block.times, time_ns), 1)
-        if time_ns < block.times[0] or (time_ns < block.times[1] and block.times[0] == block.times[1]):
-            return None
         quality: Quality = "disturbed" if block.disturbed else "good"
-        if after == 1 and block.gap is not None and time_ns < block.times[1]:
-            if block.gap == "missing":
-                return None
-            quality = block.gap
-        t0, t1 = block.times[after - 1], block.times[after]
-        fraction = (time_ns - t0) / (t1 - t0) if t1 > t0 else 1.0
-        quats = block.quats
+        after = bisect_left(block.times, time_ns)
+        t1 = block.times[after]
+        if after > 0:
+            t0, before = block.times[after - 1], block.quats[after - 1]
+        elif time_ns == t1:
+            t0, before = t1, block.quats[0]
+        elif block.before_ns == 0 or time_ns < block.before_ns or block.gap == "missing":
+            return None
+        else:
+            t0, before = block.before_ns, block.before
+            quality = block.gap or quality
         return Reading(
-            quats[after - 1],
-            quats[after],
-            fraction,
+            before,
+            block.quats[after],
+            (time_ns - t0) / (t1 - t0) if t1 > t0 else 1.0,
             quality,
-            block.first_sequence + after - 1,
+            block.first_sequence + after,
             block.received_ns,
         )
 
@@ -222,7 +243,7 @@ class SegmentTrack:
         """Return the time of the first sample later than an instant, or None while there is none."""
         for block in self._blocks:
             if block.times[-1] > after_ns:
-                return next(t for t in block.times[1:] if t > after_ns)
+                return next(t for t in block.times if t > after_ns)
         return None
 
     def latest(self) -> Reading | None:
@@ -230,7 +251,7 @@ class SegmentTrack:
         if not self._blocks:
             return None
         block = self._blocks[-1]
-        sequence = block.first_sequence + len(block.times) - 2
+        sequence = block.first_sequence + len(block.times) - 1
         return Reading(block.quats[-1], block.quats[-1], 0.0, "held", sequence, block.received_ns)
 
     def forget(self, before_ns: int) -> None:
@@ -250,7 +271,16 @@ class SegmentTrack:
             "batch_ns": self.batch_ns,
             "filter": self._filter.state(),
             "blocks": [
-                [b.times, b.quats.ravel().tolist(), b.first_sequence, b.received_ns, b.gap, b.disturbed]
+                [
+                    b.before_ns,
+                    b.before.tolist(),
+                    b.times,
+                    b.quats.ravel().tolist(),
+                    b.first_sequence,
+                    b.received_ns,
+                    b.gap,
+                    b.disturbed,
+                ]
                 for b in self._blocks
             ],
             "last_gyr": None if self._last_gyr is None else self._last_gyr.tolist(),
@@ -261,13 +291,14 @@ class SegmentTrack:
 
     def restore(self, state: dict[str, Any]) -> None:
         """Go on as the track whose state this is would have."""
-        self.counter = SequenceCounter(*state["counter"], gaps=[(first, end) for first, end in state["gaps"]])
+        self.counter = SequenceCounter(*state["counter"])
+        self.counter.gaps = [(first, end) for first, end in state["gaps"]]
         self.last_ns, self.still_since_ns = state["last_ns"], state["still_since_ns"]
         self.batch_ns, self.restarts = state["batch_ns"], state["restarts"]
         self._filter.restore(state["filter"])
         self._blocks = deque(
-            _Block(times, np.array(quats).reshape(-1, 4), first, received, gap, disturbed)
-            for times, quats, first, received, gap, disturbed in state["blocks"]
+            _Block(before_ns, np.array(before), times, np.array(quats).reshape(-1, 4), *rest)
+            for before_ns, before, times, quats, *rest in state["blocks"]
         )
         self._last_gyr = None if state["last_gyr"] is None else np.array(state["last_gyr"])
         self._last_acc = None if state["last_acc"] is None else np.array(state["last_acc"])

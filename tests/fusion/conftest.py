@@ -102,7 +102,9 @@ def info_messages(segments, subject="p01", **more) -> list[tuple[keys.Key, bytes
     result = []
     for segment in segments:
         mounting = mountings.get(segment)
-        message = info(node=f"n-{segment}", mounting=None if mounting is None else tuple(mounting), **more)
+        message = info(
+            node=f"n-{segment}", mounting=None if mounting is None else tuple(map(float, mounting)), **more
+        )
         result.append((keys.Key("room", subject, "info", segment), encode(message)))
     return result
 

@@ -1,12 +1,12 @@
 """The numbers of a batch: blocks of bytes to arrays and back, checked once, here."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from math import isfinite
 from operator import lt
 from struct import unpack
 from typing import NamedTuple
 
+import msgspec
 import numpy as np
 import numpy.typing as npt
 
@@ -29,8 +29,7 @@ MAX_SPAN_NS = 4_000_000_000
 """Offsets are u32 ns, so a batch spans at most 4.29 s."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Samples:
+class Samples(msgspec.Struct, frozen=True, kw_only=True, eq=False):
     """The samples of one batch as arrays; blocks that the sensor does not deliver are None."""
 
     sequence: int
