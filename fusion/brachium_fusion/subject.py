@@ -99,6 +99,7 @@ class Subject:
         self._refused: dict[str, Info] = {}
         """What a second host said, for when the first is gone."""
         self._done_ns = 0
+        self._begun_ns = 0
         self._host: str | None = None
         self._pose: _Pose | None = _Pose() if settings.auto_pose else None
         self._held: dict[str, list[tuple[int, Floats]]] = {}
@@ -182,7 +183,7 @@ class Subject:
             return
         self.received_ns = max(self.received_ns, samples.received_ns)
         if self._next_ns is None:
-            self._next_ns = self._first_tick(track.first_ns)
+            self._next_ns, self._begun_ns = self._first_tick(track.first_ns), samples.received_ns
         if track.restarts != restarts:
             self._lose(segment, mounting=False)
 
@@ -240,7 +241,9 @@ class Subject:
         for track in self.tracks.values():
             if track.last_ns >= now:
                 reached = True
-            elif track.last_ns and not self._ended and self._behind(track) <= HELD_NS:
+            elif self._ended:
+                continue
+            elif self._behind(track) <= HELD_NS if track.last_ns else self._beginning():
                 return None
         if not reached:
             return None
@@ -252,6 +255,10 @@ class Subject:
                 gone = self._ended or self._behind(track) > MISSING_NS
                 readings[segment] = None if gone else track.latest()
         return readings
+
+    def _beginning(self) -> bool:
+        """Return whether a sensor that is known and silent may still begin together with the others."""
+        return self.received_ns - self._begun_ns <= HELD_NS
 
     def _behind(self, track: SegmentTrack) -> int:
         """Return how far a sensor is behind the newest arrival, beyond what its own batches explain."""
@@ -372,6 +379,7 @@ class Subject:
         return {
             "next_ns": self._next_ns,
             "done_ns": self._done_ns,
+            "begun_ns": self._begun_ns,
             "refused": {s: msgspec.to_builtins(info) for s, info in self._refused.items()},
             "unclaimed": {s: [_plain(b) for b in batches] for s, batches in self._unclaimed.items()},
             "host": self._host,
@@ -388,7 +396,7 @@ class Subject:
     def restore(self, state: dict[str, Any]) -> None:
         """Go on as the subject whose state this is would have."""
         self._next_ns, self._host = state["next_ns"], state["host"]
-        self._done_ns = state["done_ns"]
+        self._done_ns, self._begun_ns = state["done_ns"], state["begun_ns"]
         self._refused = {s: msgspec.convert(info, Info) for s, info in state["refused"].items()}
         self._unclaimed = {
             s: deque((_samples(b) for b in batches), WAITING_BATCHES)

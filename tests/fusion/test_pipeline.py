@@ -747,3 +747,27 @@ def test_a_skeleton_names_the_last_sample_it_used_and_when_that_came(made) -> No
         for _, sequence in used:
             assert made.sample_times(sequence, 1)[0] == skeleton.time_ns
         assert skeleton.received_ns == max(arrivals[u] for u in used)
+
+
+def test_sensors_that_begin_together_are_solved_together_whichever_is_heard_first(made) -> None:
+    quats, _, _ = worn(made, seconds=3.0)
+    head, body = made.info_messages(quats), made.orientation_messages(quats)
+    for first in (body[:3], body[2::-1], [body[1], body[0], body[2]]):
+        skeletons = run([*head, *first, *body[3:]])
+        assert skeletons[0].time_ns == made.START
+        assert set(skeletons[0].segments) == set(quats)
+
+
+def test_a_known_sensor_that_never_begins_holds_nobody_up_for_longer_than_150_ms(made) -> None:
+    quats, _, _ = worn(made, seconds=2.0)
+    head = made.info_messages(quats)
+    body = [m for m in made.orientation_messages(quats, batch=1) if m[0].detail != "hand_r"]
+    pipeline = fed(head)
+    first = None
+    for message in body:
+        pipeline.feed(*message)
+        if pipeline.skeletons():
+            first = time_of(message) - made.START
+            break
+    assert first is not None
+    assert 150 * MS <= first <= 180 * MS
