@@ -121,7 +121,7 @@ def test_starts_rates_gaps_and_rows_without_numbers(made, tmp_path) -> None:
     assert set(quality[601:605]) == {"held"}
     assert set(quality[802:888]) == {"held", "missing"}
     assert set(quality[875:888]) == {"missing"}
-    assert set(quality[60:590]) == {"good"}
+    assert set(quality[70:590]) == {"good"}
     assert np.isnan(columns["forearm_r_qw"][875:888]).all()
     assert np.isnan(columns["elbow_flexion"][875:888]).all()
     assert np.isnan(columns["forearm_r_qw"][:49]).all()
