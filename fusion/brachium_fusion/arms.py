@@ -355,7 +355,7 @@ def _messages(
     trunks, values, points = trunk_from_world.tolist(), angles.tolist(), places.tolist()
     rests_on = ((angle_codes == ASSUMED).any(axis=1) | (place_codes == ASSUMED).any(axis=1)).tolist()
     patterns = [_pattern(row.tobytes()) for row in np.logical_not(np.isnan(angles))]
-    complete_places = np.logical_not(np.isnan(places[..., 0])).all(axis=1).tolist()
+    complete_places = np.all(~np.isnan(places[..., 0]), axis=1).tolist()
     skeletons = []
     for i, row in enumerate(rows):
         given = patterns[i].named(values[i])
