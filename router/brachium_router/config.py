@@ -10,6 +10,9 @@ from brachium_wire.topics import TOPICS
 
 LARGEST_MESSAGE = 2 << 20
 """Bytes of one transport message; above every topic's own limit, far below Zenoh's 1 GiB."""
+DATA_QUEUE = 16
+"""Batches of 64 kB that wait for a slow reader before samples are dropped: Zenoh's most. A tick of a hundred arms
+is more than its usual two."""
 OTHER_LIMIT = 262_144
 """Bytes of a question or an answer, when no topic of the table is larger."""
 
@@ -47,7 +50,11 @@ def router_json5(settings: RouterSettings) -> str:
         raise BadRouterSettings(f"max_sessions {settings.max_sessions} cannot be used: write 1 or more")
     transport: dict[str, Any] = {
         "unicast": {"max_sessions": settings.max_sessions, "accept_pending": 64, "accept_timeout": 5000},
-        "link": {"protocols": ["tcp"], "rx": {"max_message_size": LARGEST_MESSAGE}},
+        "link": {
+            "protocols": ["tcp"],
+            "rx": {"max_message_size": LARGEST_MESSAGE},
+            "tx": {"queue": {"size": {"data": DATA_QUEUE}}},
+        },
         "shared_memory": {"enabled": False},
     }
     if settings.users_file is not None:

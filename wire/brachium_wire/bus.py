@@ -62,7 +62,10 @@ def client_config(endpoint: str, password: str | None = None) -> zenoh.Config:
         },
         "listen": {"endpoints": []},
         "scouting": {"multicast": {"enabled": False}, "gossip": {"enabled": False}},
-        "transport": {"link": {"tx": {"lease": LEASE_MS}}, "shared_memory": {"enabled": False}},
+        "transport": {
+            "link": {"tx": {"lease": LEASE_MS, "queue": {"size": {"data": 16}}}},
+            "shared_memory": {"enabled": False},
+        },
     }
     if password:
         settings["transport"]["auth"] = {"usrpwd": {"user": ROOM_USER, "password": password}}
