@@ -11,8 +11,8 @@ from brachium_wire.topics import TOPICS
 LARGEST_MESSAGE = 2 << 20
 """Bytes of one transport message; above every topic's own limit, far below Zenoh's 1 GiB."""
 DATA_QUEUE = 16
-"""Batches of 64 kB that wait for a slow reader before samples are dropped: Zenoh's most. A tick of a hundred arms
-is more than its usual two."""
+"""Batches of 64 kB that may wait for a reader before messages are dropped: Zenoh's most. A tick of a hundred
+arms is more than its usual two."""
 OTHER_LIMIT = 262_144
 """Bytes of a question or an answer, when no topic of the table is larger."""
 
