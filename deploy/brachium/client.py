@@ -11,14 +11,13 @@ from weakref import WeakSet
 from brachium_wire import keys
 from brachium_wire.bus import DEFAULT_ENDPOINT, Bus, Inbox
 from brachium_wire.codec import WireError, decode
-from brachium_wire.keys import BadKey, Key
+from brachium_wire.keys import DEFAULT_ROOM, BadKey, Key
 from brachium_wire.messages import Event, Health, Message, SampleBatch, Skeleton
 from brachium_wire.samples import Samples, read_samples
 from brachium_wire.topics import TOPICS
 
 log = logging.getLogger(__name__)
 
-DEFAULT_ROOM = "lab"
 LOOK_S = 0.5
 """A plain loop wakes this often without a message, so that a signal is answered."""
 

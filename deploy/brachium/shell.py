@@ -13,8 +13,6 @@ from typing import Any, Protocol
 
 from brachium_wire import keys
 
-DEFAULT_ROOM = "lab"
-
 EXTRAS = {
     "pyarrow": "parquet",
     "rerun": "view",
@@ -84,7 +82,7 @@ def run_command(name: str, summary: str, module: Any, words: list[str]) -> int:
 
 def add_room(parser: argparse.ArgumentParser) -> None:
     """Add --room."""
-    parser.add_argument("--room", default=DEFAULT_ROOM, help="the room's name in keys")
+    parser.add_argument("--room", default=keys.DEFAULT_ROOM, help="the room's name in keys")
 
 
 def add_network(parser: argparse.ArgumentParser) -> None:

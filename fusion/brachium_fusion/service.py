@@ -38,7 +38,7 @@ class FuseSettings:
     """What `brachium fuse` takes."""
 
     endpoint: str = DEFAULT_ENDPOINT
-    room: str = "room"
+    room: str = keys.DEFAULT_ROOM
     service_id: str = "fusion"
     pipeline: Settings = field(default_factory=Settings)
 

@@ -39,7 +39,7 @@ class EmulateSettings:
     """Emulated wearers and the way in for their nodes."""
 
     endpoint: str = DEFAULT_ENDPOINT
-    room: str = "lab"
+    room: str = keys.DEFAULT_ROOM
     id: str = "emulate"
     """Names the service; with `direct` also the host."""
     gateway: str = "ws://127.0.0.1:8765/node"

@@ -40,7 +40,7 @@ class GatewaySettings:
     """One gateway. Every node needs a token; there is no way in without."""
 
     endpoint: str = DEFAULT_ENDPOINT
-    room: str = "lab"
+    room: str = keys.DEFAULT_ROOM
     id: str = "gateway"
     """Names the service and its clock: `info.host` of its nodes."""
     bind: str = "127.0.0.1"

@@ -33,7 +33,7 @@ class PlaySettings:
     path: Path
     """A capture folder, or a recording."""
     endpoint: str = DEFAULT_ENDPOINT
-    room: str = "lab"
+    room: str = keys.DEFAULT_ROOM
     id: str = "play"
     """Names the service; with `direct` also the host."""
     gateway: str = "ws://127.0.0.1:8765/node"

@@ -5,7 +5,7 @@ import json
 from dataclasses import dataclass
 from typing import Any
 
-from brachium_wire.keys import ROOT
+from brachium_wire import keys
 from brachium_wire.topics import TOPICS
 
 LARGEST_MESSAGE = 2 << 20
@@ -27,7 +27,7 @@ class RouterSettings:
 
     bind: str = "127.0.0.1"
     port: int = 7447
-    room: str = "lab"
+    room: str = keys.DEFAULT_ROOM
     """The room in which the router shows its own health."""
     max_sessions: int = 256
     """Programs attached at once; one more is refused."""
@@ -97,7 +97,7 @@ def size_limits() -> list[dict[str, Any]]:
 
 def _key_expression(pattern: str) -> str:
     chunks = ["*" if chunk.startswith("<") else chunk for chunk in pattern.split("/")]
-    return "/".join([ROOT, "*", *chunks])
+    return "/".join([keys.ROOT, "*", *chunks])
 
 
 def _address(bind: str) -> ipaddress.IPv4Address | ipaddress.IPv6Address:

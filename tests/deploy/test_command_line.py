@@ -1,10 +1,24 @@
+import argparse
 import os
+import re
+import shlex
 import subprocess
 import sys
+from dataclasses import fields
+from importlib import import_module
 
 import pytest
 
 from brachium.__main__ import COMMANDS, main
+from brachium_fusion.service import FuseSettings
+from brachium_nodes.emulate import EmulateSettings
+from brachium_nodes.gateway import GatewaySettings
+from brachium_nodes.play import PlaySettings
+from brachium_router.config import RouterSettings
+from brachium_viewer.live import ViewSettings
+from brachium_viewer.monitor import MonitorSettings
+from brachium_viewer.recorder import RecordSettings
+from brachium_wire.keys import DEFAULT_ROOM
 
 HEAVY = (
     "numpy",
@@ -46,6 +60,34 @@ def test_each_command_explains_itself_with_an_example(name: str, capsys: pytest.
     assert f"usage: brachium {name}" in said
     example = said.split("example:\n")[1]
     assert f"brachium {name} " in example or f"brachium {name}\n" in example
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_examples_have_options_that_are_there(name: str):
+    module = import_module(f"brachium.commands.{name}")
+    lines = re.findall(rf"^ *brachium {name}\b(.*)$", module.__doc__ or "", re.MULTILINE)
+    assert lines
+    for line in lines:
+        parser = argparse.ArgumentParser(exit_on_error=False)
+        module.configure(parser)
+        parser.parse_args(shlex.split(line.split(">")[0]))
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [
+        RouterSettings,
+        GatewaySettings,
+        EmulateSettings,
+        PlaySettings,
+        FuseSettings,
+        ViewSettings,
+        RecordSettings,
+        MonitorSettings,
+    ],
+)
+def test_all_programs_meet_in_one_room(settings: type):
+    assert [f.default for f in fields(settings) if f.name == "room"] == [DEFAULT_ROOM]
 
 
 @pytest.mark.parametrize("name", COMMANDS)

@@ -34,7 +34,7 @@ class ViewSettings:
     """What to show, and where."""
 
     endpoint: str = DEFAULT_ENDPOINT
-    room: str = "lab"
+    room: str = keys.DEFAULT_ROOM
     subject: str = "*"
     web: bool | None = None
     """In a browser; None: in a window if there is a display, else in a browser."""

@@ -23,7 +23,7 @@ class MonitorSettings:
     """What to watch, and how to show it."""
 
     endpoint: str = DEFAULT_ENDPOINT
-    room: str = "lab"
+    room: str = keys.DEFAULT_ROOM
     json: bool = False
     """One line of JSON a second."""
     seconds: float | None = None

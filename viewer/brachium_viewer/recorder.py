@@ -29,7 +29,7 @@ class RecordSettings:
     """What to record, and where."""
 
     endpoint: str = DEFAULT_ENDPOINT
-    room: str = "lab"
+    room: str = keys.DEFAULT_ROOM
     subject: str | None = None
     """Only this subject, and the services; None: everybody in the room."""
     folder: Path = Path("recordings")

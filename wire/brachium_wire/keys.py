@@ -12,6 +12,8 @@ from typing import NamedTuple
 
 ROOT = "brachium"
 SERVICE = "service"
+DEFAULT_ROOM = "lab"
+"""The room of whoever names none."""
 
 # One rule for everything that becomes part of a key: Zenoh itself would accept wildcards, spaces and control
 # characters, and a leading '@' hides a key from wildcards.
