@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 from brachium_wire import keys
-from brachium_wire.bus import Bus, Inbox, NoRouter
+from brachium_wire.bus import PASSWORD_VARIABLE, Bus, Inbox, NoRouter
 from brachium_wire.codec import decode
 from brachium_wire.heart import Heart
 from brachium_wire.messages import Answer, Health
@@ -385,6 +385,19 @@ def test_no_router_is_said_within_the_deadline(router: Any) -> None:
     with pytest.raises(NoRouter, match="start one with: brachium router"):
         Bus.open(router.endpoint, timeout_s=0.5)
     assert time.monotonic() - start < 10.0
+
+
+@pytest.mark.parametrize(
+    ("password", "said"), [("one", "the room's password is wrong"), (None, "has a password, set")]
+)
+def test_a_password_may_be_why_no_router_answers(
+    router: Any, monkeypatch: pytest.MonkeyPatch, password: str | None, said: str
+) -> None:
+    router.stop()
+    monkeypatch.delenv(PASSWORD_VARIABLE, raising=False)
+    with pytest.raises(NoRouter, match=said) as error:
+        Bus.open(router.endpoint, timeout_s=0.0, password=password)
+    assert PASSWORD_VARIABLE in str(error.value)
 
 
 @pytest.mark.parametrize(

@@ -168,9 +168,7 @@ class Bus:
             except zenoh.ZError as error:
                 reason = str(error).split(" at /")[0]
             if deadline is not None and time.monotonic() >= deadline:
-                raise NoRouter(
-                    f"no router at {endpoint} ({reason}); start one with: brachium router"
-                ) from None
+                raise NoRouter(f"no router at {endpoint} ({reason}); {_to_do(password)}") from None
             if not warned:
                 log.warning("waiting for the router at %s", endpoint)
                 warned = True
@@ -352,6 +350,14 @@ class Bus:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.close()
+
+
+def _to_do(password: str | None) -> str:
+    """Return what may help: Zenoh says the same of a router that is not there and of a wrong password."""
+    start = "start one with: brachium router"
+    if password:
+        return f"{start}; or the room's password is wrong (${PASSWORD_VARIABLE})"
+    return f"{start}; or, where the room has a password, set ${PASSWORD_VARIABLE}"
 
 
 def _line(error: Exception) -> str:
