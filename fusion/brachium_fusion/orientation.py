@@ -93,7 +93,9 @@ class VqfFilter:
 
     def restore(self, state: dict[str, Any]) -> None:
         """See OrientationFilter.restore."""
-        self._filter.state = {k: np.array(v) if isinstance(v, list) else v for k, v in state["vqf"].items()}
+        plain = state["vqf"]
+        vqf_state: Any = {k: np.array(v) if isinstance(v, list) else v for k, v in plain.items()}
+        self._filter.state = vqf_state
         self.disturbed = state["disturbed"]
 
 

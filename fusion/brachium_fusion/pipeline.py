@@ -16,7 +16,8 @@ from typing import Any, NamedTuple
 import msgpack
 import msgspec
 
-from brachium_fusion.arms import Arms, Row, check_session, rows_of
+from brachium_fusion.arms import Arms
+from brachium_fusion.rows import Row, check_session, rows_of
 from brachium_fusion.subject import Change, Settings, Subject, checked_wish
 from brachium_wire import keys
 from brachium_wire.codec import WireError, decode_batch, decode_topic, encode
@@ -145,7 +146,7 @@ class Pipeline:
                     "rate_hz": settings.rate_hz,
                     "auto_pose": settings.auto_pose,
                 },
-                state=msgpack.packb(state),
+                state=msgpack.packb(state) or b"",
             )
         )
 

@@ -49,7 +49,7 @@ def tabulate(
         row = row_of.get(skeleton.time_ns)
         if row is not None:
             found[skeleton.side].append((row, skeleton))
-    by_side = {side: rows for side, rows in found.items() if rows}
+    by_side: dict[Side, list[tuple[int, Skeleton]]] = {side: rows for side, rows in found.items() if rows}
     result = Result(np.asarray(time_s, dtype=np.float64))
     segments = _segments(by_side)
     n = len(result.columns["time"])

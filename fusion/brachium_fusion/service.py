@@ -30,6 +30,9 @@ a hundred every 40 ms, because a round of kinematics costs about a millisecond w
 GC_ALLOCATIONS = 20_000
 """Python's 700 would look for cycles, of which messages make none, a hundred times a second."""
 
+PUT_AT_ONCE, PUT_PAUSE_S = 200, 0.001
+"""After a hold-up a thousand skeletons are due at once: pauses let the send queue take them all."""
+
 Reply = Callable[[bytes], None]
 
 
@@ -130,6 +133,8 @@ class FusionService:
             skeleton = solved.skeleton
             self._bus.put(keys.skeleton(self._room, solved.subject, skeleton.side), encode(skeleton))
             self._heart.counts["skeletons"] += 1
+            if self._heart.counts["skeletons"] % PUT_AT_ONCE == 0:
+                time.sleep(PUT_PAUSE_S)
         news, self._pipeline.calibrations = self._pipeline.calibrations, []
         for subject, calibration in news:
             self._bus.retain(keys.calibration(self._room, subject), encode(calibration))

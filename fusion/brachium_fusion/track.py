@@ -19,8 +19,10 @@ Floats = npt.NDArray[np.float64]
 
 BRIDGE_NS = 100_000_000
 """A gap up to this is bridged by interpolation when its far end is there, and marked held."""
-RESTART_NS = 1_000_000_000
+RESTART_NS = 500_000_000
 """After a longer gap the filter starts anew: what it would carry over is further off than a fresh start."""
+SETTLE_NS = 5_000_000_000
+"""After a gap that was not bridged, tilt and heading take this long to come back (VQF's tau_acc is 3 s)."""
 AHEAD_NS = 1_000_000_000
 """A sample cannot be from later than its arrival; one that claims more than this would end the stream."""
 STILL_RAD_S = 0.15
@@ -74,6 +76,7 @@ class SegmentTrack:
         self._last_gyr: Floats | None = None
         self._last_acc: Floats | None = None
         self._disturbed_since: int | None = None
+        self._settled_ns = 0
         self.restarts = 0
         """How often the filter lost its heading by a long gap."""
         cal = info.calibration
@@ -133,6 +136,8 @@ class SegmentTrack:
         missing = round(silence / period_ns) - 1 if gap or silence > 2.5 * period_ns else 0
         if missing > 0 and self._blocks:
             kind = "held" if silence <= BRIDGE_NS else "missing"
+            if kind == "missing":
+                self._settled_ns = samples.time_ns[0] + SETTLE_NS
             if silence > RESTART_NS:
                 self._filter = self._new_filter()
                 self.restarts += 1
@@ -181,6 +186,8 @@ class SegmentTrack:
                 return
 
     def _is_disturbed(self, now_ns: int) -> bool:
+        if now_ns < self._settled_ns:
+            return True
         if not self._filter.disturbed:
             self._disturbed_since = None
             return False
@@ -286,6 +293,7 @@ class SegmentTrack:
             "last_gyr": None if self._last_gyr is None else self._last_gyr.tolist(),
             "last_acc": None if self._last_acc is None else self._last_acc.tolist(),
             "disturbed_since": self._disturbed_since,
+            "settled_ns": self._settled_ns,
             "restarts": self.restarts,
         }
 
@@ -302,4 +310,4 @@ class SegmentTrack:
         )
         self._last_gyr = None if state["last_gyr"] is None else np.array(state["last_gyr"])
         self._last_acc = None if state["last_acc"] is None else np.array(state["last_acc"])
-        self._disturbed_since = state["disturbed_since"]
+        self._disturbed_since, self._settled_ns = state["disturbed_since"], state["settled_ns"]

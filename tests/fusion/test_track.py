@@ -98,10 +98,17 @@ def test_a_gap_up_to_100_ms_is_held_and_bridged_over_a_turn(made, magnetometer) 
 
 
 def test_a_gap_beyond_100_ms_is_missing_and_the_filter_is_carried_over(made) -> None:
-    track, _ = tracked(made, [turning(made, 0, 100), turning(made, 130, 50)], orientation_only=False)
+    batches = [
+        turning(made, 0, 100),
+        turning(made, 130, 50),
+        turning(made, 180, 200),
+        turning(made, 380, 251),
+    ]
+    track, _ = tracked(made, [*batches, turning(made, 631, 5)], orientation_only=False)
     before = heading_at(track, made.sample_times(99, 1)[0])
     assert track.at(made.START + 1100 * MS) is None
-    assert track.at(made.sample_times(130, 1)[0]).quality == "good"
+    assert track.at(made.sample_times(130, 1)[0]).quality == "disturbed"  # while the filter comes back
+    assert track.at(made.sample_times(632, 1)[0]).quality == "good"
     assert heading_at(track, made.sample_times(130, 1)[0]) - before == pytest.approx(0.31, abs=1e-3)
     assert track.restarts == 0
 
