@@ -75,6 +75,7 @@ class Gateway:
         self._connections: dict[str, Connection] = {}
         self._tokens: dict[str, Callable[[], None]] = {}
         self._tasks: set[asyncio.Task[None]] = set()
+        self._told: dict[tuple[str, str], str] = {}  # whose info a place shows, connected or not
 
     async def serve(self, address: str, stop: threading.Event) -> None:
         """Listen until `stop` is set."""
@@ -166,11 +167,13 @@ class Gateway:
         self._tokens.pop(hello.node)()
         if admission.subject not in self._subjects():
             self._claims.release(admission.subject)
+        self._forget(hello.node)
         log.info("node %s left", hello.node)
 
     def _publish(self, admission: Admission, topic: str, message: Message) -> None:
         room, subject, segment = self._settings.room, admission.subject, admission.segment
         if topic == "info":
+            self._told[subject, segment] = admission.entry.id
             self._bus.retain(keys.info(room, subject, segment), encode(message))
         elif topic == "status":
             self._bus.put(keys.status(room, subject, segment), encode(message))
@@ -179,6 +182,13 @@ class Gateway:
             self._heart.counts["batches"] += 1
             self._heart.counts["samples"] += len(message.offsets) // 4
             self._bus.put(keys.imu(room, subject, segment), encode(message))
+
+    def _forget(self, node: str) -> None:
+        """Show no info any more at a place that a node was assigned away from."""
+        for place in [p for p, teller in self._told.items() if teller == node]:
+            if place != self._roster.place_of(node):
+                del self._told[place]
+                self._bus.forget(keys.info(self._settings.room, *place))
 
     def _expel(self, connection: Connection, refusal: Refusal) -> None:
         task = asyncio.create_task(connection.do(connection.conversation.expel(refusal)))
@@ -210,6 +220,8 @@ class Gateway:
         connection = self._connections.get(node)
         if connection is not None:
             self._expel(connection, Refusal("reassigned", f"assigned to {segment} of {subject}", 0.0))
+        else:
+            self._forget(node)
         self._beat(now=True)
         return ""
 

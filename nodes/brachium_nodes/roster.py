@@ -119,6 +119,13 @@ class Roster:
         entry = self._entries.get(node)
         return entry.subject if entry is not None else None
 
+    def place_of(self, node: str) -> tuple[str, str] | None:
+        """Return the subject and segment a node is assigned to."""
+        entry = self._entries.get(node)
+        if entry is None or entry.subject is None or entry.segment is None:
+            return None
+        return entry.subject, entry.segment
+
     def leave(self, node: str) -> None:
         """Take that the node's last connection is gone."""
         self._connected.pop(node, None)

@@ -179,7 +179,42 @@ def test_assigning_a_connected_node_sends_it_to_its_new_place(gateway, bus) -> N
         assert await node.closed() == f.CLOSE_CODES["reassigned"]
         welcome = await node.join()
         assert (welcome.subject, welcome.segment) == ("p02", "forearm_l")
+        new = keys.info(ROOM, "p02", "forearm_l")
+        await until(lambda: infos(bus) == [new], "the info at the new place alone")
         await node.leave(0)
+
+    play(work)
+
+
+def infos(bus) -> list[str]:
+    return sorted(key for key, _ in bus.fetch(keys.subjects(ROOM, "imu/*/info")))
+
+
+def assign(bus, node: str, subject: str, segment: str) -> Answer:
+    question = encode(Command(arguments={"id": node, "segment": segment}))
+    return decode(bus.ask(keys.command(ROOM, subject, "assign"), question), Answer)
+
+
+def test_the_info_of_a_node_assigned_away_is_forgotten_unless_another_took_the_place(gateway, bus) -> None:
+    url = gateway(entry("n1", "forearm_r"), entry("n2", "hand_r")).url
+
+    async def joined(node: str) -> None:
+        one = client(url, node)
+        await one.join()
+        await one.leave(0)
+
+    async def work() -> None:
+        await joined("n1")
+        await joined("n2")
+        hand, fore = keys.info(ROOM, "p01", "hand_r"), keys.info(ROOM, "p01", "forearm_r")
+        await until(lambda: infos(bus) == [fore, hand], "both infos, though both nodes are off")
+        assert (await asyncio.to_thread(assign, bus, "n1", "p01", "upper_arm_r")).ok
+        await until(lambda: infos(bus) == [hand], "the hand's info alone")
+        assert (await asyncio.to_thread(assign, bus, "n1", "p01", "hand_r")).ok
+        await joined("n1")  # n2 is off: its place is free
+        assert (await asyncio.to_thread(assign, bus, "n2", "p01", "forearm_r")).ok
+        await joined("n2")
+        await until(lambda: infos(bus) == [fore, hand], "the infos of both new places")
 
     play(work)
 

@@ -114,6 +114,45 @@ def test_subscribe_then_fetch_ends_with_the_last_value_whenever_it_joins(
     assert done.is_set()
 
 
+def test_a_forgotten_value_is_fetched_no_more_and_may_come_again(connect: Connect, until: Until) -> None:
+    publisher, reader = connect(), connect()
+    other = keys.session("gym", "p02")
+    publisher.retain(SESSION, b"1")
+    publisher.retain(other, b"other")
+    inbox = reader.subscribe(SESSION)
+    everyone = keys.subjects("gym", "session")
+    until(lambda: len(reader.fetch(everyone)) == 2, "both values")
+    publisher.forget(SESSION)
+    until(lambda: reader.fetch(everyone) == [(other, b"other")], "the other value alone")
+    publisher.forget(SESSION)  # twice is harmless
+    publisher.retain(SESSION, b"2")
+    until(lambda: reader.fetch(SESSION) == [(SESSION, b"2")], "the new value")
+    assert inbox.drain() == [(SESSION, b"2")]
+    publisher.close()
+    publisher.forget(SESSION)
+
+
+def test_retaining_and_forgetting_from_many_threads_ends_with_what_came_last(
+    connect: Connect, until: Until
+) -> None:
+    publisher = connect()
+
+    def change() -> None:
+        for value in range(100):
+            publisher.retain(SESSION, b"%d" % value)
+            publisher.forget(SESSION)
+
+    threads = [threading.Thread(target=change) for _ in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    reader = connect()
+    until(lambda: reader.fetch(SESSION) == [], "nothing")
+    publisher.retain(SESSION, b"last")
+    until(lambda: reader.fetch(SESSION) == [(SESSION, b"last")], "the last value")
+
+
 def test_retained_values_of_many_threads_end_alike_for_early_and_late_readers(
     connect: Connect, until: Until
 ) -> None:

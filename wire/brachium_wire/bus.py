@@ -141,6 +141,7 @@ class Bus:
         self._publishers: dict[str, zenoh.Publisher] = {}
         self._kept: list[Any] = []
         self._retained: dict[str, bytes] = {}
+        self._answering: dict[str, zenoh.Queryable[Any]] = {}
 
     @classmethod
     def open(
@@ -215,18 +216,28 @@ class Bus:
         value.
         """
         keys.parse(key)
-        with self._lock:
-            known = key in self._retained
-            self._retained.setdefault(key, payload)
-        if not known and not self._closed:  # before the put: who comes between the two must find the value
-
-            def answer(query: zenoh.Query) -> None:
-                query.reply(key, self._retained[key])
-
-            self._keep(self._session.declare_queryable(key, answer))
         with self._retaining:  # the order of what is kept is the order of what is put
-            self._retained[key] = payload
+            self._retained[key] = payload  # before the put: who comes between the two must find the value
+            if key not in self._answering and not self._closed:
+                self._answering[key] = self._session.declare_queryable(key, self._teller(key))
             self.put(key, payload)
+
+    def forget(self, key: str) -> None:
+        """Answer for a retained key no more; who heard its value keeps it. Nothing happens where none is."""
+        keys.parse(key)
+        with self._retaining:
+            answering = self._answering.pop(key, None)
+            self._retained.pop(key, None)
+            if answering is not None and not self._closed:
+                answering.undeclare()  # type: ignore[no-untyped-call]  # as Zenoh types it
+
+    def _teller(self, key: str) -> Callable[[zenoh.Query], None]:
+        def tell(query: zenoh.Query) -> None:
+            payload = self._retained.get(key)
+            if payload is not None:  # else it was forgotten just now
+                query.reply(key, payload)
+
+        return tell
 
     def _keep(self, declared: Any) -> None:
         with self._lock:
