@@ -93,8 +93,8 @@ class Arms:
         self._tracker.grow(len(self._index))
         result = np.empty_like(raw)
         turns = _turns(arms)
-        for turn in range(int(turns.max()) + 1):
-            now = turns == turn
+        order = np.argsort(turns, kind="stable")
+        for now in np.split(order, np.flatnonzero(np.diff(turns[order])) + 1):
             result[now] = self._tracker.step(arms[now], raw[now], thorax_from_upper_arm[now], left[now])
         return result
 
