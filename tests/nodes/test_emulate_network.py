@@ -1,5 +1,6 @@
 """Emulated wearers over a real network: what is injected is counted, and truth has the same time."""
 
+import asyncio
 import threading
 import time
 from itertools import pairwise
@@ -9,6 +10,7 @@ import pytest
 
 from brachium_body.continuation import AngleTracker
 from brachium_nodes.emulate import EmulateSettings, node_entries, run
+from brachium_nodes.emulated_power import EmulatedPower
 from brachium_nodes.link import FaultSettings
 from brachium_nodes.node_client import NotWelcome
 from brachium_nodes.node_stream import Timeline
@@ -105,7 +107,15 @@ def test_injected_and_counted_are_the_same_and_truth_has_gateway_time(gateway, l
 @pytest.mark.network
 def test_several_wearers_publish_directly_and_faster(listener, endpoint) -> None:
     settings = EmulateSettings(
-        endpoint=endpoint, room=ROOM, id="emu", direct=True, speed=4.0, seconds=3.0, wearers=2, faults=FAULTS
+        endpoint=endpoint,
+        room=ROOM,
+        id="emu",
+        direct=True,
+        speed=4.0,
+        seconds=3.0,
+        wearers=2,
+        alike=False,
+        faults=FAULTS,
     )
     report = run(settings, threading.Event())
     last = listener.until_gone(6)
@@ -131,7 +141,6 @@ def test_wearers_that_move_alike_send_the_same_samples(listener, endpoint) -> No
         direct=True,
         seconds=1.0,
         wearers=3,
-        alike=True,
         wearer=worn,
         truth=False,
     )
@@ -144,6 +153,66 @@ def test_wearers_that_move_alike_send_the_same_samples(listener, endpoint) -> No
     assert sent["p001"] == sent["p002"] == sent["p003"]
     assert len(sent["p001"]) >= 18
     assert "truth" not in {k.topic for k, _ in listener.heard}
+
+
+@pytest.mark.network
+def test_twenty_wearers_keep_real_time_and_end_when_told(listener, endpoint) -> None:
+    stop, reports = threading.Event(), []
+    settings = EmulateSettings(endpoint=endpoint, room=ROOM, direct=True, wearers=20)
+    thread = threading.Thread(target=lambda: reports.append(run(settings, stop)))
+    thread.start()
+    listener.until(lambda: len(listener.of("truth")) >= 20 * 100, "the truth of 20 arms for 2 s")
+    stop.set()
+    thread.join(timeout=2)
+    assert not thread.is_alive(), "emulate did not end within 2 s"
+    counts = [count for streams in reports[0].streams.values() for count in streams.values()]
+    assert len(counts) == 60
+    assert min(count.next_sequence for count in counts) >= 180  # no stream waited for another, nor for truth
+    times: dict[str, list[int]] = {}
+    for key, message in listener.heard:
+        if key.topic == "truth":
+            times.setdefault(key.subject, []).append(message.time_ns)
+    assert len(times) == 20
+    first = times["p001"]
+    assert all(told[:99] == first[:99] for told in times.values())
+    assert {b - a for a, b in pairwise(first)} == {20_000_000}
+
+
+def test_whoever_is_late_gives_the_others_their_turn() -> None:
+    async def work() -> list[str]:
+        timeline, stop, turns = Timeline(), threading.Event(), []
+
+        async def late(name: str) -> None:
+            for _ in range(3):
+                assert await timeline.reach(-10.0, stop)
+                turns.append(name)
+
+        await asyncio.gather(late("a"), late("b"))
+        stop.set()
+        assert not await timeline.reach(-10.0, stop)
+        return turns
+
+    assert asyncio.run(work()) == ["a", "b"] * 3
+
+
+@pytest.mark.network
+@pytest.mark.parametrize("direct", [True, False])
+def test_battery_and_signal_are_told(gateway, listener, endpoint, direct: bool) -> None:
+    worn = WearerSettings(segments=("hand_r",))
+    settings = EmulateSettings(
+        endpoint=endpoint, room=ROOM, token="t", direct=direct, seconds=3.5, wearer=worn
+    )
+    if not direct:
+        url = gateway(*node_entries(settings)).url
+        settings = EmulateSettings(**{**vars(settings), "gateway": url})
+    run(settings, threading.Event())
+    last = listener.until_gone(1)["p01", "hand_r"]
+    assert last.node_dropped == 0
+    assert last.battery_v is not None
+    assert last.rssi_dbm is not None
+    power = EmulatedPower.draw(worn.seed, "hand_r")
+    assert last.rssi_dbm in {power.status(second).rssi_dbm for second in (1.0, 2.0, 3.0)}
+    assert abs(last.battery_v - power.full_v) < 0.002
 
 
 @pytest.mark.network

@@ -88,7 +88,7 @@ def name(value: Any) -> str:
 
 
 def test_every_kind_of_message_is_tried() -> None:
-    assert set(GOOD) == set(Message.__subclasses__())
+    assert set(GOOD) == {kind for kind in Message.__subclasses__() if kind.__module__ == Message.__module__}
 
 
 @pytest.mark.parametrize("kind", GOOD, ids=name)

@@ -38,7 +38,8 @@ def test_the_page_is_as_the_code_says() -> None:
 
 
 def test_every_kind_has_golden_bytes() -> None:
-    kinds = {str(kind.__struct_config__.tag) for kind in Message.__subclasses__()}
+    ours = [kind for kind in Message.__subclasses__() if kind.__module__ == Message.__module__]
+    kinds = {str(kind.__struct_config__.tag) for kind in ours}
     assert set(GOLDEN) == set(EXAMPLES) == kinds
     assert {str(row.message.__struct_config__.tag) for row in TOPICS.values()} <= kinds
 
