@@ -50,6 +50,7 @@ class DirectSink:
         self._host, self._stream = host, stream
         self._counter = SequenceCounter(next=0)
         self._end: Callable[[], None] | None = None
+        self._said = NodeStatus()
 
     async def join(self) -> None:
         """Claim the subject, show the node, publish its info."""
@@ -102,19 +103,20 @@ class DirectSink:
 
     async def tell(self, status: NodeStatus) -> None:
         """Publish the node's status."""
-        self._status(connected=True, dropped=status.dropped)
+        self._said = status
+        self._status(connected=True)
 
     async def leave(self, next_sequence: int) -> None:
         """Publish a last status with final counts and take the token away."""
         if self._end is None:
             return
         self._counter.end(next_sequence)
-        self._status(connected=False, dropped=None)
+        self._status(connected=False)
         self._end()
         self._end = None
 
-    def _status(self, *, connected: bool, dropped: int | None) -> None:
-        counter, host = self._counter, self._host
+    def _status(self, *, connected: bool) -> None:
+        counter, host, said = self._counter, self._host, self._said
         status = Status(
             node=self._stream.hello.node,
             time_ns=host.now_ns(),
@@ -122,7 +124,10 @@ class DirectSink:
             received=counter.received,
             lost=counter.lost,
             out_of_order=counter.out_of_order,
-            node_dropped=dropped,
+            battery_v=said.battery_v,
+            battery_hours=said.battery_hours,
+            rssi_dbm=said.rssi_dbm,
+            node_dropped=said.dropped,
             clock_uncertainty_ns=UNCERTAINTY_NS,
             drops={"repeated": counter.repeated} if counter.repeated else {},
         )

@@ -7,6 +7,7 @@ from dataclasses import replace
 import msgspec
 import numpy as np
 
+from brachium_nodes.emulated_power import EmulatedPower
 from brachium_nodes.link import EmulatedClock, FaultSettings
 from brachium_nodes.node_frames import Batch, Hello
 from brachium_nodes.node_stream import NodeStream, Outgoing
@@ -41,6 +42,7 @@ def node_streams(subject: str, wearer: Wearer, faults: FaultSettings, boot: int)
                 mounting=info.mounting,
                 packets=map(outgoing, wearer.packets(segment, faults)),
                 clock_us=_reader(clock),
+                says=EmulatedPower.draw(wearer.settings.seed, segment).status,
             )
         )
     return streams

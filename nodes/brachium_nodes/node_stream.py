@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from brachium_nodes.node_frames import Batch, Hello
+from brachium_nodes.node_frames import Batch, Hello, NodeStatus
 from brachium_wire.messages import Quaternion
 
 LOOK_S = 0.05
@@ -37,6 +37,8 @@ class NodeStream:
     packets: Iterator[Outgoing]
     clock_us: Callable[[float], int]
     """What the node's clock shows at a source time in s; linear."""
+    says: Callable[[float], NodeStatus] = lambda _time_s: NodeStatus()
+    """What the node says of itself at a source time in s; nothing by default."""
 
 
 @dataclass(slots=True, kw_only=True)
@@ -82,12 +84,15 @@ class Timeline:
         return (time.monotonic_ns() - self.start_ns) * 1e-9 * self.speed
 
     async def reach(self, due_s: float, stop: Stop) -> bool:
-        """Wait until source time `due_s`; return False when `stop` came first."""
+        """Wait until source time `due_s`; return False when `stop` came first.
+
+        Whoever is late still lets the others have their turn, so all are late alike.
+        """
         while not stop.is_set():
-            wait_s = (due_s - self.now_s()) / self.speed
-            if wait_s <= 0.0:
-                return True
+            wait_s = max((due_s - self.now_s()) / self.speed, 0.0)
             await asyncio.sleep(min(wait_s, LOOK_S))
+            if wait_s <= LOOK_S:
+                return not stop.is_set()
         return False
 
 

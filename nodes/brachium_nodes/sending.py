@@ -59,7 +59,8 @@ async def send_all(
                 counting.sent(packet.batch.sequence, samples)
                 if timeline.now_s() - told_s >= STATUS_S:
                     told_s = timeline.now_s()
-                    await sink.tell(NodeStatus(dropped=counting.count.dropped))
+                    said = stream.says(told_s)
+                    await sink.tell(msgspec.structs.replace(said, dropped=counting.count.dropped))
             except ConnectionError:
                 counting.count.dropped += samples
                 joining = asyncio.create_task(join(stream, sink, stop))
