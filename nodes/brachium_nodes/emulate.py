@@ -1,15 +1,14 @@
 """The emulated wearer in real time: each segment a node of its own, and the truth beside it."""
 
 import asyncio
+import itertools
 import logging
 import secrets
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from math import ceil, inf
 from threading import Event
 
-import numpy as np
-
-from brachium_body.continuation import AngleTracker
 from brachium_body.segments import Side
 from brachium_nodes.direct_node import DirectHost, DirectSink
 from brachium_nodes.emulated_nodes import alike, node_id, node_streams
@@ -25,11 +24,13 @@ from brachium_wire.bus import DEFAULT_ENDPOINT, Bus
 from brachium_wire.codec import encode
 from brachium_wire.heart import Heart
 from brachium_wire.hosttime import NoHostTime, follow_host_time
-from brachium_wire.messages import Session
+from brachium_wire.messages import Session, Skeleton
 
 log = logging.getLogger(__name__)
 
 TRUTH_NS = 20_000_000
+LATE_S = 3.0
+"""A source that is later than this tells so, once."""
 LARGEST_BATCH = 96
 """Samples of 40 bytes that fit in a frame."""
 
@@ -52,9 +53,9 @@ class EmulateSettings:
     seconds: float | None = None
     subject: str = "p01"
     wearers: int = 1
-    """More than one: subjects p001, p002, ..., each with the next seed."""
-    alike: bool = False
-    """All wearers move as the first: a hundred cost little more than one."""
+    """More than one: subjects p001, p002, ..."""
+    alike: bool = True
+    """All wearers move as the first: a hundred cost little more than one. Else each has the next seed."""
     wearer: WearerSettings = field(default_factory=WearerSettings)
     faults: FaultSettings = field(default_factory=FaultSettings)
     truth: bool = True
@@ -117,15 +118,14 @@ class _Emulation:
     def __init__(self, settings: EmulateSettings, bus: Bus, stop: Event) -> None:
         self._settings, self._bus, self._stop = settings, bus, stop
         self._timeline = Timeline(settings.speed)
-        step = 0 if settings.alike else 1
-        self._wearers = {
-            subject: Wearer(replace(settings.wearer, seed=settings.wearer.seed + number * step))
-            for number, subject in enumerate(settings.subjects())
-        }
+        subjects, seed = settings.subjects(), settings.wearer.seed
+        together = [subjects] if settings.alike else [(subject,) for subject in subjects]
+        self._wearers = [
+            (Wearer(replace(settings.wearer, seed=seed + number)), names)
+            for number, names in enumerate(together)
+        ]
+        """Who moves, and the subjects that move so."""
         self._direct: DirectHost | None = None
-        self._trackers = {
-            (name, side): AngleTracker() for name, w in self._wearers.items() for side in sides(w)
-        }
         self._heart = Heart(bus, settings.room, "emulate", settings.id)
         self._nodes: list[tuple[NodeStream, Sink]] = []
 
@@ -134,18 +134,15 @@ class _Emulation:
         if settings.direct:
             self._direct = DirectHost(self._bus, settings.room, settings.id, self._timeline)
         boot = secrets.randbits(32)
-        wearers = list(self._wearers.items())
         streams = [
             stream
-            for subject, wearer in wearers[: 1 if settings.alike else None]
-            for stream in node_streams(subject, wearer, settings.faults, boot)
+            for wearer, subjects in self._wearers
+            for stream in alike(node_streams(subjects[0], wearer, settings.faults, boot), subjects)
         ]
-        if settings.alike:
-            streams = alike(streams, settings.subjects())
         self._nodes = [(stream, self._sink(stream)) for stream in streams]
         if settings.session:
-            for subject, wearer in wearers:
-                self._bus.retain(keys.session(settings.room, subject), encode(session(wearer)))
+            for subject in settings.subjects():
+                self._bus.retain(keys.session(settings.room, subject), encode(session(settings.wearer)))
         end_s = inf if settings.seconds is None else settings.seconds
         counts = await send_streams(self._nodes, self._timeline, end_s, self._stop, self._beside)
         report: dict[str, dict[str, StreamCount]] = {}
@@ -167,22 +164,33 @@ class _Emulation:
         except NoHostTime as error:
             log.warning("no truth will be told: %s", error)
             return
-        tick = ceil(origin_ns / TRUTH_NS)
-        while True:
+        first_ns, warned = ceil(origin_ns / TRUTH_NS) * TRUTH_NS, False
+        truth = self._truth(origin_ns, first_ns)
+        for tick in itertools.count():
             self._heart.beat()
-            due_s = (tick * TRUTH_NS - origin_ns) * 1e-9
+            due_s = (first_ns + tick * TRUTH_NS - origin_ns) * 1e-9
             if not await self._timeline.reach(due_s, self._stop):
                 return
-            if self._settings.truth:
-                self._truth(tick, origin_ns)
-            tick += 1
+            if not warned and self._timeline.now_s() - due_s > LATE_S * self._timeline.speed:
+                log.warning("this machine is too slow for what is emulated: samples come late")
+                warned = True
+            for skeletons, places in truth:
+                payload = encode(next(skeletons))
+                for place in places:
+                    self._bus.put(place, payload)
 
-    def _truth(self, tick: int, origin_ns: int) -> None:
-        time_s = np.array([(tick * TRUTH_NS - origin_ns) / 1e9])
-        for subject, wearer in self._wearers.items():
-            for side in sides(wearer):
-                for skeleton in wearer.skeletons(time_s, side, origin_ns, self._trackers[subject, side]):
-                    self._bus.put(keys.truth(self._settings.room, subject, side), encode(skeleton))
+    def _truth(self, origin_ns: int, first_ns: int) -> list[tuple[Iterator[Skeleton], list[str]]]:
+        """Return what each arm does, tick by tick, and the keys it is told on."""
+        if not self._settings.truth:
+            return []
+        return [
+            (
+                wearer.skeleton_stream(side, origin_ns, first_ns, TRUTH_NS),
+                [keys.truth(self._settings.room, subject, side) for subject in subjects],
+            )
+            for wearer, subjects in self._wearers
+            for side in sides(wearer.settings)
+        ]
 
     def _origin_ns(self) -> int:
         """Return host time at true time 0: the gateway's, for samples get theirs from it."""
@@ -193,13 +201,11 @@ class _Emulation:
         return follow_host_time(self._bus, self._settings.room, host).at(self._timeline.start_ns)
 
 
-def sides(wearer: Wearer) -> tuple[Side, ...]:
+def sides(person: WearerSettings) -> tuple[Side, ...]:
     """Return the arms that exercise."""
-    arms = wearer.settings.arms
-    return ("right", "left") if arms == "both" else (arms,)
+    return ("right", "left") if person.arms == "both" else (person.arms,)
 
 
-def session(wearer: Wearer) -> Session:
+def session(person: WearerSettings) -> Session:
     """Return what a subject's session says of an emulated wearer."""
-    person = wearer.settings
     return Session(side=person.arms, height_m=person.height_m, facing_deg=0.0, exercise=person.exercise)

@@ -1,6 +1,7 @@
 """Emulate a wearer: its sensors, through the gateway or straight to the bus, and the truth beside them.
 
 brachium emulate --exercise drinking --level typical --seconds 60
+  brachium emulate --wearers 20 --seconds 60
   brachium emulate --print-nodes --token-file token.txt >> site.toml
 """
 
@@ -21,6 +22,11 @@ def configure(parser: argparse.ArgumentParser) -> None:
     add_json(parser)
     parser.add_argument("--subject", default="p01", help="the subject's name")
     parser.add_argument("--wearers", type=int, default=1, help="more than one: p001, p002, ...")
+    parser.add_argument(
+        "--different",
+        action="store_true",
+        help="each of many wearers moves by itself: some twenty a core (default: all move as the first)",
+    )
     add_wearer(parser)
     add_faults(parser)
 
@@ -78,6 +84,7 @@ def settings(args: argparse.Namespace, token: str) -> "EmulateSettings":
         seconds=args.seconds,
         subject=args.subject,
         wearers=args.wearers,
+        alike=not args.different,
         wearer=WearerSettings(
             exercise=args.exercise,
             arms=args.arms,
