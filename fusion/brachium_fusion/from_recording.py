@@ -30,6 +30,8 @@ class Contents:
     """`imu` and `info` messages in order of arrival."""
     changes: list[Change] = field(default_factory=list)
     snapshot: Snapshot | None = None
+    settings: Settings | None = None
+    """What fusion said of itself, where there is no snapshot."""
     live: list[Skeleton] = field(default_factory=list)
     """The skeletons that were published."""
 
@@ -44,7 +46,7 @@ def sort_out(messages: Iterable[Recorded]) -> dict[str, Contents]:
                 subjects.setdefault(parsed.subject, Contents()).samples.append((parsed, payload))
             elif parsed.topic in ("event", "snapshot", "skeleton"):
                 _sort_message(subjects.setdefault(parsed.subject, Contents()), parsed.topic, payload)
-        except (keys.BadKey, WireError):
+        except (keys.BadKey, WireError, TypeError):
             continue
     return subjects
 
@@ -53,6 +55,8 @@ def _sort_message(contents: Contents, topic: str, payload: bytes) -> None:
     message = decode_topic(payload, topic)
     if isinstance(message, Event) and message.kind == "applied":
         contents.changes.append(Change(message.time_ns, message.text, message.data))
+    elif isinstance(message, Event) and message.kind == "settings" and contents.settings is None:
+        contents.settings = Settings(**message.data)
     elif isinstance(message, Snapshot) and contents.snapshot is None:
         contents.snapshot = message
     elif isinstance(message, Skeleton):
@@ -61,7 +65,9 @@ def _sort_message(contents: Contents, topic: str, payload: bytes) -> None:
 
 def settings_of(contents: Contents) -> Settings:
     """Return the settings that were live, as far as the recording tells."""
-    return Settings() if contents.snapshot is None else Settings(**contents.snapshot.settings)
+    if contents.snapshot is not None:
+        return Settings(**contents.snapshot.settings)
+    return contents.settings or Settings()
 
 
 def solve(subject: str, contents: Contents, settings: Settings) -> tuple[Pipeline, list[Solved]]:

@@ -136,16 +136,10 @@ class Pipeline:
         """
         subject = self.subject(subject_id)
         state = {"subject": subject.state(), "arms": self._arms.state(subject_id)}
-        settings = self.settings
         return encode(
             Snapshot(
                 time_ns=subject.received_ns,
-                settings={
-                    "filter": settings.filter,
-                    "magnetometer": settings.magnetometer,
-                    "rate_hz": settings.rate_hz,
-                    "auto_pose": settings.auto_pose,
-                },
+                settings=self.settings.plain(),
                 state=msgpack.packb(state) or b"",
             )
         )

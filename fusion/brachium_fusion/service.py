@@ -69,6 +69,7 @@ class FusionService:
         """What was refused before it reached a subject."""
         self._inbox: Inbox = bus.subscribe(keys.subjects(settings.room, "imu/**"))
         self._sessions: Inbox = bus.subscribe(keys.subjects(settings.room, "session"))
+        self._told: set[str] = set()
         self._asked: list[tuple[keys.Key, bytes, Reply]] = []
         self._lock = threading.Lock()
         self._waiting: dict[str, list[tuple[float, Reply]]] = {}
@@ -88,6 +89,7 @@ class FusionService:
             self._heard_session(key, payload)
         self._heard(self._inbox.drain())
         self._publish()
+        self._tell_settings()
         with self._lock:
             asked, self._asked = self._asked, []
         for parsed, question, reply in asked:
@@ -127,6 +129,17 @@ class FusionService:
             except ValueError as error:
                 log.warning("%s: session left aside: %s", subject, error)
                 self._door[Drop.OUT_OF_RANGE.value] += 1
+
+    def _tell_settings(self) -> None:
+        """Say once for each subject how it is solved: a recording without a snapshot repeats it so."""
+        for subject in self._pipeline.subjects.keys() - self._told:
+            self._told.add(subject)
+            event = Event(
+                time_ns=self._pipeline.subject(subject).next_tick_ns(),
+                kind="settings",
+                data=self._pipeline.settings.plain(),
+            )
+            self._bus.put(keys.event(self._room, subject), encode(event))
 
     def _publish(self) -> None:
         for solved in self._pipeline.skeletons():

@@ -6,7 +6,7 @@ changes stamped with the instant from which they hold. So a recording of them gi
 
 from collections import Counter, deque
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any, NamedTuple
 
 import msgspec
@@ -50,6 +50,10 @@ class Settings:
     """Skeletons a second, on multiples of the period in host time."""
     auto_pose: bool = True
     """Take the first stillness of all sensors as the n-pose."""
+
+    def plain(self) -> dict[str, Any]:
+        """Return the settings as plain values: Settings(**plain) are the same."""
+        return asdict(self)
 
 
 class Change(NamedTuple):
@@ -357,7 +361,7 @@ class Subject:
         self._say(now, "done", pose=pose)
 
     def _say(self, now: int, state: str, pose: str = "", reason: str = "") -> None:
-        alignment = self.alignment if state == "done" and self.alignment is not None else Alignment()
+        alignment = self.alignment or Alignment()  # what was known before still holds when a pose is refused
         self._announce(
             Calibration(
                 time_ns=now,

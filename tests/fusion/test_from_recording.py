@@ -17,7 +17,7 @@ from brachium_nodes.wearer import Wearer, WearerSettings
 from brachium_wire import keys
 from brachium_wire.codec import decode, encode
 from brachium_wire.messages import Event, Info, Session, Snapshot
-from brachium_wire.recording import RecordingWriter, read
+from brachium_wire.recording import Recorded, RecordingWriter, read
 from brachium_wire.samples import write_samples
 
 SUBJECT = "p01"
@@ -233,3 +233,13 @@ def test_the_largest_difference_is_infinite_where_only_one_has_a_number(messages
         (contents,) = from_recording.sort_out(recorded).values()
     assert contents.snapshot is None
     assert isinstance(decode(Pipeline().snapshot(SUBJECT), Snapshot), Snapshot)
+
+
+def test_without_a_snapshot_the_settings_are_those_that_fusion_told() -> None:
+    chosen = Settings(filter="complementary", magnetometer=False, rate_hz=25.0, auto_pose=False)
+    told = Event(time_ns=1, kind="settings", data=chosen.plain())
+    other = Event(time_ns=2, kind="settings", data={"filter": "vqf", "unknown": 1})
+    messages = [Recorded(keys.event("room", SUBJECT), encode(e), e.time_ns) for e in (told, other)]
+        Recorded(keys.event("room", SUBJECT), encode(event), event.time_ns) for event in (told, other)
+    ]
+    assert from_recording.settings_of(from_recording.sort_out(messages)[SUBJECT]) == chosen

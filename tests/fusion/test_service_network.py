@@ -166,6 +166,16 @@ def test_samples_become_skeletons_and_every_count_is_told(made, fusion, bus) -> 
     assert [c.state for c in service.calibrations] == ["done"]
 
 
+def test_fusion_tells_each_subjects_recording_how_it_solves(made, fusion, bus) -> None:
+    service = fusion("told", filter="complementary", magnetometer=False, rate_hz=25.0)
+    quats = hanging(made, 0.5)
+    retain_info(bus, "told", made, quats)
+    put(bus, "told", made.orientation_messages(quats))
+    service.until(lambda: any(e.kind == "settings" for e in service.events), "the settings")
+    told = [Settings(**e.data) for e in service.events if e.kind == "settings"]
+    assert told == [Settings(filter="complementary", magnetometer=False, rate_hz=25.0)]
+
+
 def test_bad_bytes_and_sessions_are_counted_and_the_service_goes_on(made, fusion, bus) -> None:
     service = fusion("bad")
     quats = hanging(made, 1.0)
