@@ -117,6 +117,27 @@ def test_what_rests_on_an_assumption_is_not_compared(tmp_path: Path) -> None:
     assert arm.angles_deg["shoulder_rotation"].n == 400
 
 
+@pytest.mark.parametrize("degrees", [20.5, 19.5])
+def test_the_plane_is_compared_where_the_arm_is_truly_raised(tmp_path: Path, degrees: float) -> None:
+    """Ten instants hang and are 170 deg off in the plane; five are raised to `degrees` and 1 deg off."""
+    with recording.RecordingWriter(tmp_path / "a.mcap") as writer:
+        for i in range(15):
+            t, hangs = T0 + i * TICK, i < 10
+            true = {"isb_elevation": 5.0 if hangs else degrees, "isb_plane": 10.0, "isb_axial": -10.0}
+            off = 170.0 if hangs else 1.0
+            seen = {"isb_elevation": 90.0, "isb_plane": 10.0 + off, "isb_axial": -10.0 - off}
+            writer.write(keys.truth(ROOM, "p01", "right"), encode(skeleton(t, true, 0.0)), t)
+            writer.write(keys.skeleton(ROOM, "p01", "right"), encode(skeleton(t, seen, 0.0)), t)
+    found = figures.figures(tmp_path / "a.mcap").arms["p01/right"].angles_deg
+    assert found["isb_elevation"].n == 15
+    if degrees < 20.0:
+        assert set(found) == {"isb_elevation"}
+    else:
+        assert [(found[name].n, round(found[name].rmse, 9)) for name in ("isb_plane", "isb_axial")] == [
+            (5, 1.0)
+        ] * 2
+
+
 def test_without_truth_there_is_no_error(tmp_path: Path) -> None:
     record(tmp_path / "a.mcap", truth=False)
     arm = figures.figures(tmp_path / "a.mcap").arms["p01/right"]

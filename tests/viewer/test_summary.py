@@ -86,6 +86,7 @@ def test_its_figures_are_those_returned(made: tuple[str, figures.SummaryFigures]
     assert f"RMSE {arm.angles_deg['elbow_flexion'].rmse:.1f}°" in text
     assert f"{arm.positions_mm['hand'].rmse:.0f} mm" in text
     assert "400 of 500 skeletons compared" in text
+    assert "compared where the true elevation is 20° or more" in text
     assert "n-hand_r" in text
 
 

@@ -22,6 +22,11 @@ CLINICAL = (
     "wrist_flexion",
     "wrist_deviation",
 )
+ISB = ("isb_elevation", "isb_plane", "isb_axial")
+OF_THE_PLANE = ("isb_plane", "isb_axial")
+ELEVATED_DEG = 20.0
+"""Below this true elevation the plane, and the axial rotation against it, say nothing: hanging, only their
+sum is defined."""
 TRUTH_GAP_S = 0.1
 """Truth is interpolated between two instants at most this far apart."""
 
@@ -58,7 +63,8 @@ class ArmFigures:
     quality: dict[str, dict[str, int]]
     """Skeletons a quality, by segment."""
     angles_deg: dict[str, ErrorFigures]
-    """Published minus true; angles that rest on an assumption are left out."""
+    """Published minus true; angles that rest on an assumption are left out, and so are ISB's plane and axial
+    rotation where the true elevation is below 20 deg."""
     positions_mm: dict[str, ErrorFigures]
     """Distances from the true joint centres, in trunk axes."""
     clinical_rmse_deg: float | None
@@ -165,13 +171,21 @@ def latencies_ms(arm: ArmContents) -> list[float]:
 
 
 def angle_errors_deg(arm: ArmContents, names: list[str]) -> Floats:
-    """Return published minus true (n, k), within half a turn; NaN before calibration and where assumed."""
+    """Return published minus true (n, k), within half a turn; NaN before calibration, where assumed, and for
+    angles of the plane of elevation where the arm is not raised."""
     true = true_at(arm, _unwrapped(_ordered(arm, c.angles_rad(arm.true, names))))
     error = wrap_deg(np.degrees(c.angles_rad(arm.published, names) - true))
     error[~c.calibrated(arm.published)] = np.nan
+    low = ~_elevated(arm)
     for i, name in enumerate(names):
-        error[~measured(arm, name), i] = np.nan
+        error[~measured(arm, name) | (low & (name in OF_THE_PLANE)), i] = np.nan
     return error
+
+
+def _elevated(arm: ArmContents) -> npt.NDArray[np.bool_]:
+    """Return where the arm is truly raised far enough for its plane to be defined (n,)."""
+    elevation = true_at(arm, _ordered(arm, c.angles_rad(arm.true, ["isb_elevation"])))
+    return np.asarray(np.degrees(elevation[:, 0]) >= ELEVATED_DEG)
 
 
 def position_error_mm(arm: ArmContents, joint: str) -> Floats:

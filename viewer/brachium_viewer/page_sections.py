@@ -12,6 +12,11 @@ from brachium_viewer.figures import ArmFigures, SummaryFigures
 from brachium_viewer.statistics import ErrorFigures
 
 JOINT_NAMES = {"shoulder": "shoulder", "elbow": "elbow", "wrist": "wrist", "hand": "fingertip"}
+ANGLE_NAMES = {
+    "isb_elevation": "ISB elevation",
+    "isb_plane": "ISB plane of elevation",
+    "isb_axial": "ISB axial rotation",
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,7 +108,8 @@ def tables(figures: SummaryFigures) -> list[PageTable]:
 
 def _errors(who: str, arm: ArmFigures) -> PageTable:
     angles = arm.angles_deg
-    rows = [_row(name.replace("_", " "), "deg", 2, angles[name]) for name in f.CLINICAL if name in angles]
+    shown = [name for name in (*f.CLINICAL, *f.ISB) if name in angles]
+    rows = [_row(ANGLE_NAMES.get(name, name.replace("_", " ")), "deg", 2, angles[name]) for name in shown]
     rows += [
         _row(f"{JOINT_NAMES.get(joint, joint)}, distance", "mm", 1, error)
         for joint, error in arm.positions_mm.items()
@@ -111,7 +117,9 @@ def _errors(who: str, arm: ArmFigures) -> PageTable:
     ]
     note = (
         f"{arm.compared} of {arm.skeletons} skeletons compared: those after calibration for whose instant "
-        "truth is known. Angles that rest on an assumption are left out."
+        "truth is known. Angles that rest on an assumption are left out. ISB's plane of elevation and axial "
+        f"rotation are undefined near hanging: they are compared where the true elevation is "
+        f"{f.ELEVATED_DEG:.0f}° or more, and left out where it never is."
     )
     return PageTable(
         f"Error against truth, {who}", ["", "unit", "RMSE", "bias", "SD", "largest", "n"], rows, note

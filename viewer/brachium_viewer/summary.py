@@ -118,7 +118,10 @@ def _tiles(figures: SummaryFigures) -> list[tuple[str, str]]:
             tiles.append((f"{arm.rate_hz:.1f} Hz", f"skeletons{of}"))
         if arm.latency_p50_ms is not None and arm.latency_p99_ms is not None:
             tiles.append(
-                (f"{arm.latency_p50_ms:.0f} / {arm.latency_p99_ms:.0f} ms", f"latency, median / 99 %{of}")
+                (
+                    f"{arm.latency_p50_ms:.0f} / {arm.latency_p99_ms:.0f} ms",
+                    f"latency, median / 99\u00a0%{of}",
+                )
             )
     lost = sum(s.lost for s in figures.segments.values())
     sent = lost + sum(s.received for s in figures.segments.values())
