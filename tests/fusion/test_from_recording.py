@@ -240,6 +240,4 @@ def test_without_a_snapshot_the_settings_are_those_that_fusion_told() -> None:
     told = Event(time_ns=1, kind="settings", data=chosen.plain())
     other = Event(time_ns=2, kind="settings", data={"filter": "vqf", "unknown": 1})
     messages = [Recorded(keys.event("room", SUBJECT), encode(e), e.time_ns) for e in (told, other)]
-        Recorded(keys.event("room", SUBJECT), encode(event), event.time_ns) for event in (told, other)
-    ]
     assert from_recording.settings_of(from_recording.sort_out(messages)[SUBJECT]) == chosen
