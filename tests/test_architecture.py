@@ -23,11 +23,10 @@ PARTS = {
 LARGEST_LINES = 250
 LARGER = {
     "brachium_wire.bus": 380,  # the one module that knows Zenoh: all of it in one place
-    "brachium_wire.messages": 320,  # one record after the other
-    "brachium_fusion.arms": 500,
-    "brachium_fusion.subject": 480,
-    "brachium_fusion.track": 340,
-    "brachium_fusion.pose": 300,
+    "brachium_wire.messages": 280,  # one record after the other, each field with its words
+    "brachium_fusion.subject": 480,  # what is known of one subject, and all that may change it, in one order
+    "brachium_fusion.track": 330,  # one sensor over time: gaps, rests and heading change the same state
+    "brachium_fusion.pose": 280,  # forward and mounting are found together, from the same samples
 }
 """Modules that are larger than a file should be, and how large at most: a limit here may only fall."""
 
@@ -82,6 +81,11 @@ def test_files_are_small():
         if lines > LARGER.get(name, LARGEST_LINES):
             too_large[name] = lines
     assert too_large == {}
+
+
+def test_only_files_that_need_it_may_be_larger():
+    lines = {name: len(path.read_text("utf-8").splitlines()) for name, path in modules()}
+    assert {name: lines.get(name) for name in LARGER if lines.get(name, 0) <= LARGEST_LINES} == {}
 
 
 def test_only_the_bus_knows_zenoh():
