@@ -32,7 +32,9 @@ FAULTS = {
 def configure(parser: argparse.ArgumentParser) -> None:
     """Add the demo's options."""
     parser.add_argument("--seconds", type=float, help="how long (default: Ctrl-C ends; without a display 30)")
-    parser.add_argument("--exercise", default="elbow-flexion", help="what the wearer does")
+    parser.add_argument(
+        "--exercise", default="elbow-flexion", help="what the wearer does; an unknown name lists all"
+    )
     parser.add_argument("--level", default="typical", choices=sorted(FAULTS), help="of sensors and radio")
     parser.add_argument("--arms", default="right", help="right, left or both")
     parser.add_argument("--seed", type=int, default=1, help="of everything random")

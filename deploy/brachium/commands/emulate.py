@@ -33,9 +33,9 @@ def configure(parser: argparse.ArgumentParser) -> None:
 
 def add_wearer(parser: argparse.ArgumentParser) -> None:
     """Add who moves, and with which sensors."""
-    parser.add_argument("--exercise", default="elbow-flexion", help="what is done")
+    parser.add_argument("--exercise", default="elbow-flexion", help="what is done; an unknown name lists all")
     parser.add_argument("--arms", default="right", help="right, left or both")
-    parser.add_argument("--level", default="typical", help="sensor errors: ideal or typical")
+    parser.add_argument("--level", default="typical", help="sensor errors: exact (none), ideal or typical")
     parser.add_argument("--seed", type=int, default=1, help="of everything random")
     parser.add_argument("--rate", type=float, default=100.0, metavar="HZ", help="of the sensors")
     parser.add_argument("--batch", type=int, default=5, help="samples in a packet")
@@ -44,9 +44,9 @@ def add_wearer(parser: argparse.ArgumentParser) -> None:
 
 def add_faults(parser: argparse.ArgumentParser) -> None:
     """Add what goes wrong on the way."""
-    parser.add_argument("--loss", type=float, default=0.0, help="probability a packet")
-    parser.add_argument("--swap", type=float, default=0.0, help="probability of a late packet")
-    parser.add_argument("--duplicate", type=float, default=0.0, help="probability a packet")
+    parser.add_argument("--loss", type=float, default=0.0, help="probability that a packet is lost")
+    parser.add_argument("--swap", type=float, default=0.0, help="that it comes after its successor")
+    parser.add_argument("--duplicate", type=float, default=0.0, help="that it comes twice")
     parser.add_argument("--wifi", default="none", help="delays: none, good or busy")
 
 

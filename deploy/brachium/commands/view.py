@@ -11,7 +11,7 @@ from brachium.shell import add_network, serve
 def configure(parser: argparse.ArgumentParser) -> None:
     """Add the view's options."""
     add_network(parser)
-    parser.add_argument("--subject", default="*", help="only this subject (default: all)")
+    parser.add_argument("--subject", default="*", help="only this one; * is all")
     where = parser.add_mutually_exclusive_group()
     where.add_argument("--web", action="store_true", help="as a page, even if there is a display")
     where.add_argument("--window", action="store_true", help="in a window, even if no display is found")
