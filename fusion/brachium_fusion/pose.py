@@ -247,12 +247,13 @@ def _warnings(forward: Forward, assumed: set[str], scores: dict[str, float]) -> 
     if forward == "none":
         warnings.append(
             "no rule says where forward is: planes of movement are relative to an assumed heading; "
-            "give facing_deg (with magnetometers), a sternum sensor, or the nominal mounting of the upper arm"
+            "give facing_deg (with magnetometers), or the nominal mounting of a sternum or upper-arm sensor"
         )
     if assumed:
         warnings.append(
-            f"heading of {', '.join(sorted(assumed))} is assumed: "
-            "nothing ties it to the other sensors; give the nominal mounting"
+            f"heading of {', '.join(sorted(assumed))} is assumed: nothing ties these sensors to one another, "
+            "so angles between them, elbow and wrist included, can be far off and even have the wrong sign; "
+            "give their nominal mounting"
         )
     for name, value in scores.items():
         if name.startswith("from_nominal_deg_") and value > 45.0:

@@ -12,7 +12,7 @@ from typing import Any
 import msgspec
 
 from brachium_fusion.pipeline import Pipeline
-from brachium_fusion.subject import POSE_PATIENCE_S, Change, Settings, checked_wish
+from brachium_fusion.subject import POSE_PATIENCE_S, STILL_S, Change, Settings, checked_wish
 from brachium_wire import keys
 from brachium_wire.bus import DEFAULT_ENDPOINT, Bus, Inbox
 from brachium_wire.codec import Drop, WireError, decode, decode_topic, encode
@@ -76,6 +76,13 @@ class FusionService:
         for verb in ("calibrate", "record"):
             bus.serve_later(keys.commands(settings.room, verb), self._on_command)
         self._heard(bus.fetch(keys.subjects(settings.room, "imu/*/info")))
+        for subject in sorted(self._pipeline.subjects):
+            log.warning(
+                "%s: its sensors ran before fusion did, and are not calibrated: "
+                "stand still in the n-pose for %g s, or ask for a calibration",
+                subject,
+                STILL_S,
+            )
         for key, payload in bus.fetch(keys.subjects(settings.room, "session")):
             self._heard_session(key, payload)
 

@@ -186,9 +186,11 @@ def _finish(
             },
         )
     quality: dict[str, Counter[str]] = {}
+    first = skeletons[0].side
     for skeleton in skeletons:
         for segment, pose in skeleton.segments.items():
-            quality.setdefault(segment, Counter())[pose.quality] += 1
+            if segment != "sternum" or skeleton.side == first:  # both arms name the one sternum
+                quality.setdefault(segment, Counter())[pose.quality] += 1
     return SolveReport(
         rows=len({s.time_ns for s in skeletons}),
         sides=sorted({s.side for s in skeletons}),

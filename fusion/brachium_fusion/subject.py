@@ -156,6 +156,18 @@ class Subject:
             self.alignment = replace(known, assumed=known.assumed | {segment})
         self.revision += 1
 
+    def _begin_anew(self) -> None:
+        """Nobody wears these sensors: another run of them is another wearer, who stands in a pose again."""
+        if self.alignment is None:
+            return
+        self.alignment = None
+        self._pose = _Pose(from_ns=self.next_tick_ns()) if self._settings.auto_pose else None
+        self._held.clear()
+        self.revision += 1
+        self._say(
+            self.next_tick_ns(), "waiting", reason="another run of these sensors: stand still in the pose"
+        )
+
     def _take_over(self, now_ns: int) -> None:
         """Let the second host in, once nothing came from the first for long."""
         if any(now_ns - track.last_ns <= HOST_GONE_NS for track in self.tracks.values()):
@@ -182,12 +194,14 @@ class Subject:
                 self.drops[Drop.NO_INFO.value] += len(waiting[0])
             waiting.append(samples)
             return
-        restarts = track.restarts
+        restarts, reboots = track.restarts, track.reboots
         if not track.feed(samples, self.drops):
             return
         self.received_ns = max(self.received_ns, samples.received_ns)
         if self._next_ns is None:
             self._next_ns, self._begun_ns = self._first_tick(track.first_ns), samples.received_ns
+        if track.reboots != reboots and track.info.origin != "worn":
+            self._begin_anew()
         if track.restarts != restarts:
             self._lose(segment, mounting=False)
 

@@ -79,6 +79,8 @@ class SegmentTrack:
         self._settled_ns = 0
         self.restarts = 0
         """How often the filter lost its heading by a long gap."""
+        self.reboots = 0
+        """How often the node began to number anew."""
         cal = info.calibration
         self._gyro_bias = None if cal.gyro_bias is None else np.array(cal.gyro_bias)
         self._accel_bias = np.array(cal.accel_bias or (0.0, 0.0, 0.0))
@@ -105,6 +107,10 @@ class SegmentTrack:
             # Before it is counted: a batch that is refused must not move the number that is expected.
             drops[Drop.TIME_BACKWARDS.value] += n
             return False
+        if counter.next is not None and samples.sequence < counter.next and samples.time_ns[0] > self.last_ns:
+            # A low number with a new time is no old batch: the node was switched off and on.
+            counter.begin_again(samples.sequence)
+            self.reboots += 1
         repeated = counter.repeated
         gap = counter.feed(samples.sequence, n)
         if gap < 0:
@@ -295,6 +301,7 @@ class SegmentTrack:
             "disturbed_since": self._disturbed_since,
             "settled_ns": self._settled_ns,
             "restarts": self.restarts,
+            "reboots": self.reboots,
         }
 
     def restore(self, state: dict[str, Any]) -> None:
@@ -302,7 +309,7 @@ class SegmentTrack:
         self.counter = SequenceCounter(*state["counter"])
         self.counter.gaps = [(first, end) for first, end in state["gaps"]]
         self.last_ns, self.still_since_ns = state["last_ns"], state["still_since_ns"]
-        self.batch_ns, self.restarts = state["batch_ns"], state["restarts"]
+        self.batch_ns, self.restarts, self.reboots = state["batch_ns"], state["restarts"], state["reboots"]
         self._filter.restore(state["filter"])
         self._blocks = deque(
             _Block(before_ns, np.array(before), times, np.array(quats).reshape(-1, 4), *rest)

@@ -771,3 +771,31 @@ def test_a_known_sensor_that_never_begins_holds_nobody_up_for_longer_than_150_ms
             break
     assert first is not None
     assert 150 * MS <= first <= 180 * MS
+
+
+def later(messages: Messages, by_ns: int) -> Messages:
+    """Return another run: numbers from 0 again, times later."""
+    moved = []
+    for key, payload in messages:
+        batch = decode(payload, SampleBatch)
+        batch = msgspec.structs.replace(
+            batch, time_ns=batch.time_ns + by_ns, received_ns=batch.received_ns + by_ns
+        )
+        moved.append((key, encode(batch)))
+    return moved
+
+
+@pytest.mark.parametrize("origin", ["emulated", "worn"])
+def test_a_second_run_of_the_same_sensors_goes_on_and_who_is_not_worn_stands_in_a_pose_again(
+    made, origin
+) -> None:
+    quats, _, _ = worn(made, seconds=6.0)
+    messages = made.orientation_messages(quats)
+    pipeline = fed([*made.info_messages(quats, origin=origin), *messages])
+    first = published(pipeline)
+    second = published(fed(later(messages, 60_000_000_000), pipeline=pipeline))
+    assert len(second) > 0.95 * len(first)
+    assert not pipeline.subjects["p01"].drops
+    qualities = {s.segments["forearm_r"].quality for s in second}
+    assert ("uncalibrated" in qualities) == (origin == "emulated")
+    assert second[-1].segments["forearm_r"].quality in ("good", "heading_assumed")

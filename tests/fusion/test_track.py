@@ -3,6 +3,7 @@
 from collections import Counter
 
 import msgpack
+import msgspec
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -297,3 +298,21 @@ def test_a_disturbed_field_is_told_once_it_lasted_two_seconds(made) -> None:
         seen.append(track.at(track.last_ns).quality)
     first = seen.index("disturbed") * 10
     assert 2700 <= first <= 2900
+
+
+def test_a_node_that_was_switched_off_and_on_is_taken_on(made) -> None:
+    again = msgspec.structs.replace(turning(made, 300, 50), sequence=0)
+    track, drops = tracked(made, [turning(made, 0, 100), again], orientation_only=False)
+    assert not drops
+    assert track.reboots == 1
+    assert track.counter.received == 150
+    assert track.counter.lost == 0
+    assert track.at(again.time_ns[10]) is not None
+
+
+def test_an_old_batch_that_comes_again_is_no_new_start(made) -> None:
+    track, drops = tracked(
+        made, [turning(made, 0, 50), turning(made, 50, 50), turning(made, 0, 50)], orientation_only=False
+    )
+    assert drops == {"repeated": 50}
+    assert track.reboots == 0

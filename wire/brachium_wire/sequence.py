@@ -48,6 +48,11 @@ class SequenceCounter:
         self.next = sequence + count
         return gap
 
+    def begin_again(self, sequence: int) -> None:
+        """The sender began to number anew, with `sequence`: what was lost before stays lost."""
+        self.next = sequence
+        self.gaps = []
+
     def end(self, sequence: int) -> None:
         """Count what was lost at the very end: the node said that `sequence` would have come next."""
         if self.next is not None and sequence > self.next:
