@@ -201,3 +201,13 @@ def test_a_recording_that_another_recorder_still_writes_is_left_alone(tmp_path: 
         assert recorder.recover_folder(tmp_path) == []
         writer.write(keys.event(ROOM, "p01"), event(20), 20 * 200_000_000)
     assert recording.counts(tmp_path / "open.mcap") == {keys.event(ROOM, "p01"): 21}
+
+
+@pytest.mark.parametrize(
+    "names", [{"subject": "../../evil"}, {"subject": "*"}, {"subject": "a/b"}, {"room": "../x"}, {"id": "/"}]
+)
+def test_a_name_that_is_no_name_touches_nothing(tmp_path: Path, names: dict[str, str]):
+    folder = tmp_path / "in" / "recordings"
+    with pytest.raises(keys.BadKey, match="cannot be used"):
+        recorder.run(RecordSettings(folder=folder, **names), threading.Event())
+    assert list(tmp_path.iterdir()) == []

@@ -93,8 +93,11 @@ class Recorder:
 def run(settings: RecordSettings, stop: threading.Event) -> RecordReport:
     """Record the room until `stop` is set or the time is over, and say what the file holds.
 
-    Raises NoRouter, and OSError when the disk takes no more.
+    Raises BadKey before anything is touched, NoRouter, and OSError when the disk takes no more.
     """
+    keys.service(settings.room, "recorder", settings.id)
+    if settings.subject is not None:
+        keys.subject_chunk(settings.subject)  # it becomes part of a file's name
     settings.folder.mkdir(parents=True, exist_ok=True)
     recover_folder(settings.folder)
     clock = HostClock()
