@@ -38,6 +38,8 @@ class Child:
     started_s: float = 0.0
     due_s: float = 0.0
     pause_s: float = FIRST_PAUSE_S
+    came_up: bool = False
+    """Whoever started it has seen it at work."""
 
     def alive(self) -> bool:
         """Return whether it runs now."""
@@ -71,6 +73,17 @@ class Processes:
     def ended(self) -> list[Child]:
         """Return the children that do not run now."""
         return [child for child in self.children.values() if not child.alive()]
+
+    def hopeless(self) -> Child | None:
+        """Return a child that ended and that starting again would not help, or None.
+
+        It refused its input (exit 2), or ended by itself before it ever came up.
+        """
+        for child in self.ended():
+            code = child.process.returncode if child.process is not None else None
+            if code == 2 or (code is not None and code >= 0 and not child.came_up):
+                return child
+        return None
 
     def revive(self) -> list[Child]:
         """Start again what ended, each after its pause; return those started now."""

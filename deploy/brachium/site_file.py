@@ -1,5 +1,7 @@
 """A site file: one room, its subjects and its nodes, as TOML. What it does not know is refused by name."""
 
+import ipaddress
+import re
 import tomllib
 from difflib import get_close_matches
 from importlib.resources import files
@@ -147,9 +149,25 @@ def _check(site: Site) -> None:
             raise BadSite(f"node {node.id!r}: give both subject and segment, or neither")
         if node.subject is not None and node.subject not in subjects:
             raise BadSite(f"node {node.id!r} names subject {node.subject!r}, which no [[subject]] has")
-    for name, port in msgspec.structs.asdict(site.room.ports).items():
+        if not re.fullmatch("[0-9a-f]{64}", node.token_sha256):
+            raise BadSite(f"node {node.id!r}: token_sha256 must be 64 digits of lower-case hex")
+    _check_listening(site.room)
+
+
+def _check_listening(room: Room) -> None:
+    ports = msgspec.structs.asdict(room.ports)
+    for name, port in ports.items():
         if not 1 <= port <= 65535:
             raise BadSite(f"ports: {name} {port} cannot be used: write 1 to 65535")
+    if len(set(ports.values())) < len(ports):
+        written = ", ".join(f"{name} {port}" for name, port in ports.items())
+        raise BadSite(f"ports: {written}: each service needs a port of its own")
+    try:
+        everywhere = ipaddress.ip_address(room.bind).is_unspecified
+    except ValueError:
+        everywhere = False  # a name
+    if everywhere:
+        raise BadSite(f"bind {room.bind!r} is every interface; write the address of one")
 
 
 def _once(names: list[str], what: str) -> set[str]:

@@ -15,6 +15,13 @@ class Service:
 
     name: str
     words: list[str]
+    kind: str
+    """What its keys say it is."""
+    port: int | None = None
+    """Where it listens."""
+
+
+KINDS = {"router": "router", "gateway": "gateway", "fuse": "fusion", "record": "recorder", "view": "view"}
 
 
 def endpoint(site: Site) -> str:
@@ -25,12 +32,15 @@ def endpoint(site: Site) -> str:
 
 def wants_password(site: Site) -> bool:
     """Return whether programs need the room's password: as the file says, else beyond loopback."""
-    if site.room.password is not None:
-        return site.room.password
+    return not on_loopback(site) if site.room.password is None else site.room.password
+
+
+def on_loopback(site: Site) -> bool:
+    """Return whether the site is for this machine alone."""
     try:
-        return not ipaddress.ip_address(site.room.bind).is_loopback
+        return ipaddress.ip_address(site.room.bind).is_loopback
     except ValueError:
-        return site.room.bind != "localhost"
+        return site.room.bind == "localhost"
 
 
 def services(site: Site, path: Path, *, join_token: str, users_file: Path | None) -> list[Service]:
@@ -52,7 +62,11 @@ def services(site: Site, path: Path, *, join_token: str, users_file: Path | None
     ]
     if users_file is not None:
         words["router"] += ["--users", str(users_file)]
-    return [Service(name=name, words=words[name]) for name in room.services]
+    ports = {"router": room.ports.router, "gateway": room.ports.gateway, "view": room.ports.web}
+    return [
+        Service(name=name, words=words[name], kind=KINDS[name], port=ports.get(name))
+        for name in room.services
+    ]
 
 
 def session(subject: Subject) -> Session:

@@ -74,6 +74,26 @@ def test_pauses_double_up_to_the_longest_and_a_steady_run_forgives(children: Pro
     assert child.due_s - time.now == pytest.approx(FIRST_PAUSE_S)
 
 
+@pytest.mark.parametrize(
+    ("code", "came_up", "expected"),
+    [(2, True, True), (2, False, True), (1, False, True), (0, False, True), (1, True, False)],
+)
+def test_what_refuses_its_input_or_never_came_up_is_hopeless(
+    children: Processes, code: int, came_up: bool, expected: bool
+):
+    children.start("other", [SLEEP])
+    child = children.start("one", [f"raise SystemExit({code})"])
+    child.came_up = came_up
+    assert child.process.wait(30) == code
+    assert children.hopeless() is (child if expected else None)
+
+
+def test_a_killed_one_is_not_hopeless(children: Processes):
+    children.start("one", [SLEEP])
+    kill(children, "one")
+    assert children.hopeless() is None
+
+
 def test_the_others_run_on_while_one_is_down(children: Processes, time: Time):
     other = children.start("other", [SLEEP])
     children.start("one", [SLEEP])

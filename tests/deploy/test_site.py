@@ -7,7 +7,7 @@ from brachium.secrets_store import load_or_make, write_users
 from brachium.site_file import SERVICES, BadSite, parse
 from brachium.site_services import endpoint, services, session, wants_password
 
-NODE = '[[node]]\nid = "n1"\ntoken_sha256 = "00"\n'
+NODE = f'[[node]]\nid = "n1"\ntoken_sha256 = "{"0" * 64}"\n'
 WHOLE = """
 [room]
 id = "gym"
@@ -20,7 +20,7 @@ side = "left"
 height_m = 1.80
 [[node]]
 id = "esp-3f21"
-token_sha256 = "ab"
+token_sha256 = "abababababababababababababababababababababababababababababababab"
 subject = "p01"
 segment = "forearm_l"
 mounting = [1, 0, 0, 0]
@@ -89,6 +89,10 @@ BAD = {
         "which no [[subject]] has",
     ),
     "node twice": (f'[room]\nid = "a"\n{NODE}{NODE}', "node 'n1' is there twice"),
+    "ports equal": ('[room]\nid = "a"\nports = { router = 7001, gateway = 7001 }', "a port of its own"),
+    "every interface": ('[room]\nid = "a"\nbind = "0.0.0.0"', "every interface"),
+    "every IPv6 interface": ('[room]\nid = "a"\nbind = "::"', "every interface"),
+    "no hash": (f'[room]\nid = "a"\n{NODE.replace("0" * 64, "zz")}', "64 digits"),
     "port outside": ('[room]\nid = "a"\nports = { router = 99999 }', "65535"),
 }
 

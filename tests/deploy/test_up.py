@@ -124,3 +124,41 @@ def test_with_a_password_only_who_knows_it_attaches(site: Up):
     assert password not in " ".join(
         Path(f"/proc/{number}/cmdline").read_text() for number in site.children().values()
     )
+
+
+def test_a_second_up_says_why_and_starts_nothing(site: Up, tmp_path: Path):
+    with Bus.open(site.endpoint, timeout_s=LONG_S) as bus:
+        wait_for(tokens(bus), {("recorder", True)})
+        second = subprocess.run(
+            [sys.executable, "-m", "brachium", "up", str(tmp_path / "gym.toml")],
+            capture_output=True,
+            text=True,
+            timeout=LONG_S,
+            check=False,
+            env={**os.environ, "XDG_STATE_HOME": str(tmp_path / "state")},
+        )
+        assert second.returncode == 1
+        assert second.stdout == ""
+        assert len(second.stderr.splitlines()) == 1
+        assert f"port {site.port}" in second.stderr
+        assert len(bus.alive(keys.services("gym", "recorder/*/alive"))) == 1
+
+
+def test_a_service_that_cannot_start_ends_the_site(tmp_path: Path):
+    (tmp_path / "taken").write_text("a file, where the recorder needs a folder")
+    site = tmp_path / "gym.toml"
+    site.write_text(
+        f'[room]\nid = "gym"\nports = {{ router = {free_port()}, gateway = {free_port()} }}\n'
+        f'recordings = "{tmp_path}/taken"\n'
+    )
+    done = subprocess.run(
+        [sys.executable, "-m", "brachium", "up", str(site)],
+        capture_output=True,
+        text=True,
+        timeout=LONG_S,
+        check=False,
+        env={**os.environ, "XDG_STATE_HOME": str(tmp_path / "state")},
+    )
+    assert done.returncode == 2
+    assert "brachium up: record ended (exit 2)" in done.stderr.splitlines()[-1]
+    assert "again in" not in done.stderr
