@@ -28,10 +28,10 @@ FULL = CaptureSettings(
     sensor={"forearm_l": SensorCalibration(gyro_bias=(0.01, 0.0, -0.01))},
     calibration=CalibrationSpans(
         pose="given",
-        from_s=0.5,
-        to_s=3.0,
+        from_s=0.01,
+        to_s=0.03,
         angles_deg={"elbow_flexion": 35.0},
-        functional=(Functional(motion="elbow-flexion", from_s=5.0, to_s=15.0),),
+        functional=(Functional(motion="elbow-flexion", from_s=0.04, to_s=0.06),),
     ),
     joint={"elbow": Joint(axes=2, centre_from={"upper_arm_l": (0.0, -0.14, 0.0)})},
 )
@@ -65,14 +65,14 @@ def test_a_capture_comes_back(
     tmp_path_factory: Any, ending: Literal["csv", "parquet"], seed: int, n: int
 ) -> None:
     random = np.random.default_rng(seed)
-    t = 40.0 + np.cumsum(random.uniform(0.001, 0.1, n))
+    t = 40.0 + np.cumsum(random.uniform(0.05, 0.1, n))
     mag = random.normal(size=(n, 3))
     mag[random.random(n) < 0.3] = np.nan
     quat = random.normal(size=(n, 4))
     segments: dict[Any, CaptureSegment] = {
         "hand_l": CaptureSegment(t=t, rate_hz=1.0, quat=quat / np.linalg.norm(quat, axis=1, keepdims=True)),
         "forearm_l": CaptureSegment(
-            t=t + 0.3, rate_hz=1.0, acc=random.normal(size=(n, 3)), gyr=random.normal(size=(n, 3)), mag=mag
+            t=t + 0.02, rate_hz=1.0, acc=random.normal(size=(n, 3)), gyr=random.normal(size=(n, 3)), mag=mag
         ),
     }
     path = tmp_path_factory.mktemp("c") / "capture"
@@ -100,7 +100,7 @@ def test_rows_with_a_missing_number_are_left_out_counted_and_said(tmp_path: Path
     segment = read.segments["forearm_r"]
     assert segment.t.tolist() == [0.0, 0.07]  # the gap stays a gap
     assert segment.dropped == 2
-    assert read.warnings == ("forearm_r: 2 rows left out, because a number is missing in them",)
+    assert read.warnings == ("forearm_r: 2 rows left out, because a number is missing",)
 
 
 def test_a_slow_magnetometer_leaves_the_other_numbers(tmp_path: Path) -> None:
@@ -127,10 +127,10 @@ def test_the_nominal_rate_is_the_files_only_where_it_fits(tmp_path: Path) -> Non
         ("t,ax,ay,az\n0,0,0,9\n", "expected ax ay az and gx gy gz"),
         ("t,ax,ay,az,qw,qx,qy,qz\n0,0,0,9,1,0,0,0\n", "belong together"),
         ("t,mx,my,mz\n0,0,0,9\n", "expected ax ay az"),
-        (HEAD + "0,0,0,9.8,0,0,0\n", "1 whole rows"),
+        (HEAD + "0,0,0,9.8,0,0,0\n", "1 whole row, at least two"),
         (HEAD, "0 whole rows"),
         (HEAD + ROWS + "0.02,0,0,9.8,0,0,0\n", "data row 4 has 0.020000 after 0.020000"),
-        (HEAD + "0,0,0,9.8,0,0,oops\n", "column gz holds text"),
+        (HEAD + "0,0,0,9.8,0,0,oops\n", "data row 1, column gz holds text, 'oops'"),
         ("t,qw,qx,qy,qz\n0,1,0,0,0\n1,0,0,0,0\n", "length 0.000"),
     ],
 )
@@ -200,11 +200,92 @@ def test_one_segment_in_two_files_is_refused(tmp_path: Path) -> None:
 
 
 def test_other_units_are_doubted_aloud(tmp_path: Path) -> None:
-    text = HEAD + "0.00,0,0,1.0,0,0,0\n0.01,0,0,1.0,250,0,0\n"
+    text = HEAD + "0.00,0,0,1.0,0,0,0\n0.01,0,0,1.0,250,0,0\n0.02,0,0,1.0,9,0,0\n"
     assert [w.split(":")[1][:20] for w in capture.load(folder(tmp_path, text)).warnings] == [
         " half of all acceler",
-        " angular rates above",
+        " 1 row left out, bec",
     ]
+
+
+@pytest.mark.parametrize(
+    ("column", "value", "wrong"),
+    [("ax", "-501", 1), ("gz", "101", 1), ("mx", "10001", 1), ("ax", "500", 0), ("gz", "-100", 0)],
+)
+def test_what_no_sensor_measures_is_left_out_counted_and_said(
+    tmp_path: Path, column: str, value: str, wrong: int
+) -> None:
+    head = ["t", "ax", "ay", "az", "gx", "gy", "gz", "mx", "my", "mz"]
+    rows = [dict.fromkeys(head, "1") | {"t": f"0.0{i}", "az": "9.8"} for i in range(5)]
+    rows[2][column] = value
+    text = "\n".join([",".join(head), *(",".join(row.values()) for row in rows)]) + "\n"
+    read = capture.load(folder(tmp_path, text))
+    assert read.segments["forearm_r"].dropped == read.segments["forearm_r"].beyond == wrong
+    assert len(read.segments["forearm_r"].t) == 5 - wrong
+    assert [w[:26] for w in read.warnings] == ["forearm_r: 1 row left out,"] * wrong
+
+
+@pytest.mark.parametrize("t", ["inf", "-inf", "nan", "", "1.1e9", "-1.1e9"])
+def test_a_time_out_of_reason_is_named_with_its_row(tmp_path: Path, t: str) -> None:
+    with pytest.raises(CaptureError, match=r"forearm_r\.csv: data row 4: t .*expected seconds"):
+        capture.load(folder(tmp_path, HEAD + ROWS + f"{t},0,0,9.8,0,0,0\n"))
+
+
+EIGHT_SECONDS = HEAD + "".join(f"{40 + i / 10},0,0,9.81,0,0,0\n" for i in range(81))
+
+
+@pytest.mark.parametrize(
+    ("toml", "said"),
+    [
+        ("[calibration]\npose = 'n-pose'\nfrom_s = 100\nto_s = 103", "calibration: to_s = 103 lies after"),
+        ("[calibration]\nfrom_s = 9", "calibration: from_s = 9 lies after"),
+        (
+            "[[calibration.functional]]\nmotion = 'free'\nfrom_s = 4\nto_s = 8.5",
+            "calibration.functional free: to_s = 8.5 lies after",
+        ),
+    ],
+)
+def test_a_span_outside_the_recording_is_refused(tmp_path: Path, toml: str, said: str) -> None:
+    with pytest.raises(CaptureError, match=said + " the recording's end at 8.0 s"):
+        capture.load(folder(tmp_path, EIGHT_SECONDS, toml))
+
+
+def test_a_span_up_to_the_end_is_taken(tmp_path: Path) -> None:
+    read = capture.load(folder(tmp_path, EIGHT_SECONDS, "[calibration]\nfrom_s = 4\nto_s = 8.0"))
+    assert read.settings.calibration.to_s == 8.0
+
+
+def test_segments_that_share_no_time_are_named(tmp_path: Path) -> None:
+    path = folder(tmp_path)
+    (path / "hand_r.csv").write_text(HEAD + "".join(f"{1e6 + i / 100},0,0,9.8,0,0,0\n" for i in range(3)))
+    with pytest.raises(CaptureError, match="hand_r: begins at t = 1000000 s, after forearm_r ended at 0"):
+        capture.load(path)
+
+
+@pytest.mark.parametrize(
+    ("period", "toml", "said"),
+    [
+        (10.0, "rate_hz = 100", "10 s apart, but rate_hz = 100; t is in seconds; this looks like millisec"),
+        (10.0, None, "10 s apart; t is in seconds; this looks like milliseconds"),
+        (1e4, "rate_hz = 100", "this looks like microseconds"),
+        (
+            1e-4,
+            "rate_hz = 100",
+            "0.0001 s apart, but rate_hz = 100; t is in seconds; this looks like another",
+        ),
+    ],
+)
+def test_other_units_of_time_are_refused(tmp_path: Path, period: float, toml: str | None, said: str) -> None:
+    text = HEAD + "".join(f"{i * period},0,0,9.8,0,0,0\n" for i in range(5))
+    with pytest.raises(CaptureError, match="forearm_r: samples are .*" + said):
+        capture.load(folder(tmp_path, text, toml))
+
+
+def test_tables_of_the_other_side_are_named_with_it(tmp_path: Path) -> None:
+    path = folder(tmp_path, toml='side = "left"')
+    with pytest.raises(CaptureError, match=r'side = "left".*the right side: forearm_r; write side = "right"'):
+        capture.load(path)
+    (path / "hand_l.csv").write_text(HEAD + ROWS)
+    assert list(capture.load(path).segments) == ["forearm_r", "hand_l"]
 
 
 def test_an_existing_capture_is_not_written_over(tmp_path: Path) -> None:

@@ -15,7 +15,9 @@ import numpy.typing as npt
 
 from brachium_body.segments import SEGMENTS, Segment
 from brachium_wire import table
+from brachium_wire.capture_checks import check_agreement, check_range
 from brachium_wire.capture_settings import CaptureError, CaptureSettings, read_settings, to_toml
+from brachium_wire.samples import MAX_ACC, MAX_GYR, MAX_MAG
 
 Floats = npt.NDArray[np.float64]
 
@@ -25,6 +27,8 @@ _BLOCKS = {
     "mag": ("mx", "my", "mz"),
     "quat": ("qw", "qx", "qy", "qz"),
 }
+_LIMITS = {"acc": MAX_ACC, "gyr": MAX_GYR, "mag": MAX_MAG}
+_BOUNDS = f"above {MAX_ACC:g} m/s^2, {MAX_GYR:g} rad/s or {MAX_MAG:g} uT; is it in these units?"
 _SETTINGS, _TRUTH = "capture.toml", "truth"
 
 
@@ -41,7 +45,9 @@ class CaptureSegment:
     """A row of NaN where the magnetometer gave none."""
     quat: Floats | None = None
     dropped: int = 0
-    """Rows left out because a number in them was missing."""
+    """Rows left out: a number in them was missing, or beyond what a sensor measures."""
+    beyond: int = 0
+    """Of these, the latter."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -67,6 +73,10 @@ def load(folder: Path) -> Capture:
     segments: dict[Segment, CaptureSegment] = {
         name: _segment(path, settings.rate_hz) for name, path in files.items()
     }
+    try:
+        check_agreement(settings, {name: segment.t for name, segment in segments.items()})
+    except CaptureError as error:
+        raise CaptureError(f"{folder}: {error}") from None
     for name, segment in segments.items():
         warnings += _doubts(name, segment)
     return Capture(settings=settings, segments=segments, truth=truth, warnings=tuple(warnings))
@@ -141,12 +151,21 @@ def _segment(path: Path, nominal_hz: float | None) -> CaptureSegment:
     if (blocks["acc"] is None) != (blocks["gyr"] is None):
         raise CaptureError(f"{path}: ax ay az and gx gy gz belong together; one of them is missing")
     t = _numbers(path, columns, "t")
-    keep = np.isfinite(t)
+    check_range(path, t)
+    whole = np.ones(len(t), dtype=np.bool_)
     for name in ("acc", "gyr", "quat"):
         if (block := blocks[name]) is not None:
-            keep &= np.isfinite(block).all(axis=1)
+            whole &= np.isfinite(block).all(axis=1)
+    keep = whole.copy()
+    for name, limit in _LIMITS.items():
+        if (block := blocks[name]) is not None:
+            keep &= ~(np.abs(np.nan_to_num(block, posinf=0.0, neginf=0.0)) > limit).any(axis=1)
+    beyond = int((whole & ~keep).sum())
     t, blocks = t[keep], {name: None if b is None else b[keep] for name, b in blocks.items()}
-    _check_time(path, t, np.flatnonzero(keep))
+    if len(t) < 2:
+        out = f"; {beyond} hold what no sensor measures ({_BOUNDS})" if beyond else ""
+        raise CaptureError(f"{path}: {_rows(len(t), 'whole ')}, at least two are needed{out}")
+    _check_order(path, t, np.flatnonzero(keep))
     if (quat := blocks["quat"]) is not None:
         blocks["quat"] = _unit(path, quat)
     if (mag := blocks["mag"]) is not None:
@@ -154,7 +173,7 @@ def _segment(path: Path, nominal_hz: float | None) -> CaptureSegment:
     own_hz = 1.0 / float(np.median(np.diff(t)))
     near = nominal_hz is not None and abs(own_hz / nominal_hz - 1.0) < 0.02
     rate_hz = nominal_hz if near and nominal_hz is not None else own_hz
-    return CaptureSegment(t=t, rate_hz=rate_hz, dropped=int(len(keep) - keep.sum()), **blocks)
+    return CaptureSegment(t=t, rate_hz=rate_hz, dropped=int((~keep).sum()), beyond=beyond, **blocks)
 
 
 def _block(path: Path, columns: Mapping[str, table.Column], names: tuple[str, ...]) -> Floats | None:
@@ -170,13 +189,24 @@ def _block(path: Path, columns: Mapping[str, table.Column], names: tuple[str, ..
 
 def _numbers(path: Path, columns: Mapping[str, table.Column], name: str) -> Floats:
     if columns[name].dtype.kind not in "if":
-        raise CaptureError(f"{path}: column {name} holds text; expected numbers with a decimal point")
+        cell, row = _first_text(columns[name])
+        raise CaptureError(
+            f"{path}: data row {row}, column {name} holds text, {cell!r}; expected a number, 9.81"
+        )
     return columns[name].astype(np.float64)
 
 
-def _check_time(path: Path, t: Floats, rows: npt.NDArray[np.int64]) -> None:
-    if len(t) < 2:
-        raise CaptureError(f"{path}: {len(t)} whole rows; at least two are needed")
+def _first_text(column: table.Column) -> tuple[str, int]:
+    """Return the first cell that is no number, and its row counted from 1."""
+    for row, cell in enumerate(map(str, column.tolist()), start=1):
+        try:
+            float(cell or "nan")
+        except ValueError:
+            return cell, row
+    return str(column[0]), 1
+
+
+def _check_order(path: Path, t: Floats, rows: npt.NDArray[np.int64]) -> None:
     back = np.flatnonzero(np.diff(t) <= 0.0)
     if back.size:
         i = int(back[0])
@@ -201,8 +231,12 @@ def _doubts(name: str, segment: CaptureSegment) -> list[str]:
         said.append(
             f"{name}: half of all accelerations are far from 9.8; expected m/s^2 with gravity in them"
         )
-    if segment.gyr is not None and float(np.abs(segment.gyr).max()) > 100.0:
-        said.append(f"{name}: angular rates above 100; expected rad/s")
-    if segment.dropped:
-        said.append(f"{name}: {segment.dropped} rows left out, because a number is missing in them")
+    if missing := segment.dropped - segment.beyond:
+        said.append(f"{name}: {_rows(missing)} left out, because a number is missing")
+    if segment.beyond:
+        said.append(f"{name}: {_rows(segment.beyond)} left out, because no sensor measures that ({_BOUNDS})")
     return said
+
+
+def _rows(n: int, kind: str = "") -> str:
+    return f"{n} {kind}row{'' if n == 1 else 's'}"
