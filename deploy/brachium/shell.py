@@ -65,6 +65,8 @@ def run_command(name: str, summary: str, module: Any, words: list[str]) -> int:
     try:
         if "room" in args:
             keys.chunk(args.room, "room")
+        if getattr(args, "subject", None) not in (None, "*"):
+            keys.subject_chunk(args.subject)
         return command.run(args) or 0
     except KeyboardInterrupt:
         return 1

@@ -6,6 +6,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from brachium.option_types import duration_s, real
 from brachium.shell import Usage
 
 if TYPE_CHECKING:
@@ -27,8 +28,10 @@ def add_way_in(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--token-file", type=Path, metavar="FILE", help=f"the nodes' token (or ${TOKEN_VARIABLE})"
     )
-    parser.add_argument("--speed", type=float, default=1.0, help="times real time; not through a gateway")
-    parser.add_argument("--seconds", type=float, help="how long (default: to the end, or Ctrl-C)")
+    parser.add_argument(
+        "--speed", type=real(0.001, 1000.0), default=1.0, help="times real time; not through a gateway"
+    )
+    parser.add_argument("--seconds", type=duration_s, help="how long (default: to the end, or Ctrl-C)")
     parser.add_argument("--print-nodes", action="store_true", help="print the nodes for a site file, and end")
 
 

@@ -3,6 +3,7 @@
 import hmac
 from dataclasses import dataclass, replace
 
+from brachium_body.segments import SEGMENTS
 from brachium_nodes.node_frames import MAX_RATE_HZ, Hello, RefusalCode
 from brachium_nodes.sample_stream import Memory, SegmentMemory
 from brachium_wire import keys
@@ -56,6 +57,8 @@ class Roster:
             if entry.id in self._entries:
                 raise ValueError(f"node {entry.id!r} is in the table twice; write it once")
             self._entries[entry.id] = _checked(entry)
+        if join_token_sha256 is not None:
+            _check_sha256(join_token_sha256, "join_token_sha256")
         self._join = join_token_sha256
         self._waiting: dict[str, str] = {}
         self._connected: dict[str, tuple[str, str]] = {}
@@ -134,8 +137,8 @@ class Roster:
         """Assign a known or waiting node. Returns "" when done, else the reason why not."""
         try:
             keys.subject_chunk(subject)
-            keys.chunk(segment, "segment")
-        except keys.BadKey as error:
+            _known_segment(segment)
+        except ValueError as error:
             return str(error)
         entry = self._entries.get(node)
         if entry is None:
@@ -156,14 +159,23 @@ class Roster:
 
 def _checked(entry: NodeEntry) -> NodeEntry:
     keys.chunk(entry.id, "node id")
-    if len(entry.token_sha256) != 64 or not set(entry.token_sha256) <= set("0123456789abcdef"):
-        raise ValueError(f"node {entry.id!r}: token_sha256 must be 64 digits of lower-case hex")
+    _check_sha256(entry.token_sha256, f"node {entry.id!r}: token_sha256")
     if (entry.subject is None) != (entry.segment is None):
         raise ValueError(f"node {entry.id!r}: give both subject and segment, or neither")
     if entry.subject is not None and entry.segment is not None:
         keys.subject_chunk(entry.subject)
-        keys.chunk(entry.segment, "segment")
+        _known_segment(entry.segment)
     return entry
+
+
+def _check_sha256(text: str, what: str) -> None:
+    if len(text) != 64 or not set(text) <= set("0123456789abcdef"):
+        raise ValueError(f"{what} must be 64 digits of lower-case hex")
+
+
+def _known_segment(segment: str) -> None:
+    if segment not in SEGMENTS:
+        raise ValueError(f"segment {segment[:80]!r} is not known; choose one of {', '.join(SEGMENTS)}")
 
 
 def _wrong(hello: Hello) -> str:

@@ -10,6 +10,8 @@ from importlib import import_module
 import pytest
 
 from brachium.__main__ import COMMANDS, main
+from brachium.commands import fuse
+from brachium_fusion.orientation import FILTERS
 from brachium_fusion.service import FuseSettings
 from brachium_nodes.emulate import EmulateSettings
 from brachium_nodes.gateway import GatewaySettings
@@ -90,6 +92,10 @@ def test_all_programs_meet_in_one_room(settings: type):
     assert [f.default for f in fields(settings) if f.name == "room"] == [DEFAULT_ROOM]
 
 
+def test_the_filters_offered_are_those_of_fusion():
+    assert fuse.FILTERS == FILTERS
+
+
 @pytest.mark.parametrize("name", COMMANDS)
 def test_an_unknown_option_is_usage(name: str, capsys: pytest.CaptureFixture[str]):
     with pytest.raises(SystemExit) as ended:
@@ -116,16 +122,63 @@ BAD_INPUT = {
     "port outside": (["router", "--port", "99999"], "65535"),
     "no such input": (["solve", "nothing.mcap"], "nothing.mcap"),
     "foreign file": (["solve", __file__], "not a recording"),
+    "unknown orientation filter": (["fuse", "--filter", "magic"], "choose from"),
     "unknown filter": (["solve", "nothing.mcap", "--filter", "magic"], "choose one of"),
     "no such site": (["up", "nothing.toml"], "nothing.toml"),
     "foreign site": (["up", __file__], "not TOML"),
     "assign without a place": (["gateway", "--assign", "esp-1"], "ID=SUBJECT/SEGMENT"),
     "assign with a wildcard": (["gateway", "--assign", "esp-1=p01/*"], "segment '*'"),
+    "assign to no segment": (["gateway", "--assign", "stranger=p01/thigh"], "forearm_r"),
+    "subject outside": (["record", "--subject", "../../evil"], "cannot be used"),
+    "endpoint misspelt": (["monitor", "--endpoint", "foo"], "tcp/<host>:<port>"),
     "room of two words": (["fuse", "--room", "my room"], "room 'my room'"),
     "unknown exercise": (["emulate", "--exercise", "flying"], "choose one of"),
     "nothing to play": (["play", "nothing"], "nothing"),
     "nothing to compare": (["compare", "a.csv", "b.csv"], "a.csv"),
 }
+
+
+BAD_NUMBERS = {
+    "fuse": {"--rate": ("0", "-1", "nan", "inf", "x")},
+    "view": {"--web-port": ("99999", "-1", "x"), "--grpc-port": ("99999",), "--subject": ("../x",)},
+    "play": {"--speed": ("nan", "0", "-1", "inf"), "--seconds": ("nan", "-1", "0")},
+    "emulate": {
+        "--seconds": ("nan", "-3"),
+        "--seed": ("-1",),
+        "--wearers": ("0",),
+        "--batch": ("0", "-1"),
+        "--rate": ("nan", "0"),
+        "--loss": ("2", "nan"),
+        "--swap": ("-1",),
+        "--duplicate": ("inf",),
+    },
+    "demo": {"--seconds": ("nan", "-1", "0"), "--seed": ("-1",), "--loss": ("nan",)},
+    "record": {"--seconds": ("nan", "-1", "inf")},
+    "monitor": {"--seconds": ("nan", "0")},
+    "gateway": {"--port": ("-1", "99999"), "--join-token-sha256": ("zz",)},
+    "router": {"--port": ("0", "x"), "--max-sessions": ("0",)},
+    "bench": {"--arms": ("-1",)},
+    "solve": {"--rate": ("nan", "0")},
+    "compare": {"--from": ("nan",), "--to": ("inf",)},
+}
+
+
+@pytest.mark.parametrize(
+    ("name", "option", "value"),
+    [(n, o, v) for n, options in BAD_NUMBERS.items() for o, values in options.items() for v in values],
+)
+def test_a_number_out_of_range_is_usage(
+    name: str, option: str, value: str, capsys: pytest.CaptureFixture[str]
+):
+    places = {"play": ["x"], "solve": ["x"], "compare": ["a", "b"]}.get(name, [])
+    try:
+        code = main([name, *places, f"{option}={value}"])
+    except SystemExit as ended:
+        code = int(str(ended.code))
+    assert code == 2
+    said = capsys.readouterr().err
+    assert "cannot be used" in said
+    assert repr(value) in said
 
 
 @pytest.mark.parametrize("case", BAD_INPUT)

@@ -40,7 +40,11 @@ _ENDPOINT = re.compile(r"(tcp|tls|quic|udp|ws)/[^\s/?#]+:[0-9]{1,5}([?#]\S*)?|un
 
 
 class NoRouter(RuntimeError):
-    """No router answered at the endpoint, or nothing can be an endpoint that is written so."""
+    """No router answered at the endpoint."""
+
+
+class BadEndpoint(NoRouter, ValueError):
+    """Nothing can be an endpoint that is written so."""
 
 
 ROOM_USER = "room"
@@ -155,11 +159,11 @@ class Bus:
         """Connect to the router, trying again until `timeout_s` (None: for ever) or until `stop` is set.
 
         A room with a password is given it as `password`, or by the environment (PASSWORD_VARIABLE).
-        Raises NoRouter with one line that says what to do.
+        Raises NoRouter with one line that says what to do; BadEndpoint, one of them, at once.
         """
         password = password or os.environ.get(PASSWORD_VARIABLE)
         if not _ENDPOINT.fullmatch(endpoint):
-            raise NoRouter(f"endpoint {endpoint[:80]!r} cannot be used: write it as tcp/<host>:<port>")
+            raise BadEndpoint(f"endpoint {endpoint[:80]!r} cannot be used: write it as tcp/<host>:<port>")
         stop = stop or threading.Event()
         deadline = None if timeout_s is None else time.monotonic() + timeout_s
         warned = False

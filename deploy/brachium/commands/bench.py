@@ -8,6 +8,7 @@ import sys
 from dataclasses import asdict
 from typing import Any
 
+from brachium.option_types import whole
 from brachium.shell import add_json, print_json
 
 WINDOW_S, QUICK_WINDOW_S = 6.0, 1.0
@@ -16,7 +17,9 @@ WINDOW_S, QUICK_WINDOW_S = 6.0, 1.0
 def configure(parser: argparse.ArgumentParser) -> None:
     """Add the options."""
     parser.add_argument("--quick", action="store_true", help="short windows: a look, not a figure")
-    parser.add_argument("--arms", type=int, default=100, help="how many arms are many; 0 leaves them out")
+    parser.add_argument(
+        "--arms", type=whole(0, 10_000), default=100, help="how many arms are many; 0 leaves them out"
+    )
     add_json(parser)
 
 

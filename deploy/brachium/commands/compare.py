@@ -8,6 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from brachium.option_types import real
 from brachium.shell import Usage, add_json, print_json
 
 
@@ -17,8 +18,8 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("b", type=Path, metavar="B", help="another, or a reference, as a truth.parquet")
     parser.add_argument("--lag", help="seconds A is late, or: estimate (default: as B's capture says)")
     parser.add_argument("--mask", metavar="COLUMN", help="of B; only rows count where it is true")
-    parser.add_argument("--from", dest="from_s", type=float, metavar="S", help="only from this time of B on")
-    parser.add_argument("--to", dest="to_s", type=float, metavar="S", help="only up to this time of B")
+    parser.add_argument("--from", dest="from_s", type=real(), metavar="S", help="only from this time of B on")
+    parser.add_argument("--to", dest="to_s", type=real(), metavar="S", help="only up to this time of B")
     add_json(parser)
 
 
@@ -44,6 +45,6 @@ def run(args: argparse.Namespace) -> int:
 
 def _seconds(text: str) -> float:
     try:
-        return float(text)
-    except ValueError:
+        return real()(text)
+    except argparse.ArgumentTypeError:
         raise Usage(f"--lag takes seconds or the word estimate; came {text!r}") from None

@@ -12,6 +12,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from brachium.option_types import duration_s, probability, seed
 from brachium.shell import Failed, Usage, add_json, as_json, print_json, stop_on_signals
 from brachium.way_in import TOKEN_VARIABLE
 
@@ -31,15 +32,19 @@ FAULTS = {
 
 def configure(parser: argparse.ArgumentParser) -> None:
     """Add the demo's options."""
-    parser.add_argument("--seconds", type=float, help="how long (default: Ctrl-C ends; without a display 30)")
+    parser.add_argument(
+        "--seconds", type=duration_s, help="how long (default: Ctrl-C ends; without a display 30)"
+    )
     parser.add_argument(
         "--exercise", default="elbow-flexion", help="what the wearer does; an unknown name lists all"
     )
     parser.add_argument("--level", default="typical", choices=sorted(FAULTS), help="of sensors and radio")
     parser.add_argument("--arms", default="right", help="right, left or both")
-    parser.add_argument("--seed", type=int, default=1, help="of everything random")
+    parser.add_argument("--seed", type=seed, default=1, help="of everything random")
     parser.add_argument("--nodes", default="emulated", choices=["emulated"], help="what wearables are")
-    parser.add_argument("--loss", type=float, help="probability that a packet is lost (default: by level)")
+    parser.add_argument(
+        "--loss", type=probability, help="probability that a packet is lost (default: by level)"
+    )
     parser.add_argument("--headless", action="store_true", help="without the live view")
     parser.add_argument("--out", type=Path, metavar="DIR", help="default: brachium-demo/<date and time>")
     add_json(parser)

@@ -8,6 +8,7 @@ brachium emulate --exercise drinking --level typical --seconds 60
 import argparse
 from typing import TYPE_CHECKING
 
+from brachium.option_types import probability, real, seed, whole
 from brachium.shell import add_json, add_network, print_json, stop_on_signals
 from brachium.way_in import GATEWAY, add_way_in, node_table, read_token
 
@@ -21,7 +22,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
     add_way_in(parser)
     add_json(parser)
     parser.add_argument("--subject", default="p01", help="the subject's name")
-    parser.add_argument("--wearers", type=int, default=1, help="more than one: p001, p002, ...")
+    parser.add_argument("--wearers", type=whole(1, 10_000), default=1, help="more than one: p001, p002, ...")
     parser.add_argument(
         "--different",
         action="store_true",
@@ -36,17 +37,17 @@ def add_wearer(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--exercise", default="elbow-flexion", help="what is done; an unknown name lists all")
     parser.add_argument("--arms", default="right", help="right, left or both")
     parser.add_argument("--level", default="typical", help="sensor errors: exact (none), ideal or typical")
-    parser.add_argument("--seed", type=int, default=1, help="of everything random")
-    parser.add_argument("--rate", type=float, default=100.0, metavar="HZ", help="of the sensors")
-    parser.add_argument("--batch", type=int, default=5, help="samples in a packet")
+    parser.add_argument("--seed", type=seed, default=1, help="of everything random")
+    parser.add_argument("--rate", type=real(1.0, 1000.0), default=100.0, metavar="HZ", help="of the sensors")
+    parser.add_argument("--batch", type=whole(1, 128), default=5, help="samples in a packet")
     parser.add_argument("--segments", metavar="A,B", help="which carry a sensor (default: the arm's three)")
 
 
 def add_faults(parser: argparse.ArgumentParser) -> None:
     """Add what goes wrong on the way."""
-    parser.add_argument("--loss", type=float, default=0.0, help="probability that a packet is lost")
-    parser.add_argument("--swap", type=float, default=0.0, help="that it comes after its successor")
-    parser.add_argument("--duplicate", type=float, default=0.0, help="that it comes twice")
+    parser.add_argument("--loss", type=probability, default=0.0, help="probability that a packet is lost")
+    parser.add_argument("--swap", type=probability, default=0.0, help="that it comes after its successor")
+    parser.add_argument("--duplicate", type=probability, default=0.0, help="that it comes twice")
     parser.add_argument("--wifi", default="none", help="delays: none, good or busy")
 
 

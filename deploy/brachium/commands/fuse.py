@@ -5,16 +5,22 @@ brachium fuse --filter vqf --rate 50
 
 import argparse
 
+from brachium.option_types import real
 from brachium.shell import add_network, serve
+
+FILTERS = ("auto", "vqf", "complementary", "complementary-printed")
+"""As fusion knows them; help loads nothing heavy."""
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
     """Add fusion's options."""
     add_network(parser)
     parser.add_argument("--id", default="fusion", help="this service's name")
-    parser.add_argument("--filter", default="auto", help="auto, vqf, complementary or complementary-printed")
+    parser.add_argument("--filter", default="auto", choices=FILTERS, help="of orientation")
     parser.add_argument("--no-mag", action="store_true", help="leave magnetometers aside")
-    parser.add_argument("--rate", type=float, default=50.0, metavar="HZ", help="skeletons a second")
+    parser.add_argument(
+        "--rate", type=real(1.0, 1000.0), default=50.0, metavar="HZ", help="skeletons a second"
+    )
     parser.add_argument("--no-auto-pose", action="store_true", help="calibrate only when asked to")
 
 

@@ -8,6 +8,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from brachium.option_types import port_or_any, sha256
 from brachium.shell import Failed, Usage, add_network, serve
 
 if TYPE_CHECKING:
@@ -19,10 +20,13 @@ def configure(parser: argparse.ArgumentParser) -> None:
     add_network(parser)
     parser.add_argument("--id", default="gateway", help="names the service and its clock")
     parser.add_argument("--bind", default="127.0.0.1", help="address of one interface")
-    parser.add_argument("--port", type=int, default=8765, help="0 takes any free one")
+    parser.add_argument("--port", type=port_or_any, default=8765, help="0 takes any free one")
     parser.add_argument("--site", type=Path, metavar="FILE.toml", help="the nodes of this site file may join")
     parser.add_argument(
-        "--join-token-sha256", metavar="HEX", help="nodes with this token may knock and wait to be assigned"
+        "--join-token-sha256",
+        type=sha256,
+        metavar="HEX",
+        help="nodes with this token may knock and wait to be assigned",
     )
     parser.add_argument(
         "--assign",
@@ -69,6 +73,7 @@ def _entries(site: Path | None) -> "tuple[NodeEntry, ...]":
 
 
 def _assign(args: argparse.Namespace) -> None:
+    from brachium_body.segments import SEGMENTS
     from brachium_wire import keys
     from brachium_wire.bus import Bus
     from brachium_wire.codec import decode, encode
@@ -78,7 +83,10 @@ def _assign(args: argparse.Namespace) -> None:
     subject, _, segment = place.partition("/")
     if not (node and subject and segment):
         raise Usage(f"--assign takes ID=SUBJECT/SEGMENT, as in esp-3f21=p01/forearm_r; came {args.assign!r}")
-    keys.chunk(segment, "segment")
+    if segment not in SEGMENTS:
+        raise Usage(f"segment {segment!r} is not known; choose one of {', '.join(SEGMENTS)}")
+    keys.subject_chunk(subject)
+    keys.chunk(node, "node id")
     with Bus.open(args.endpoint) as bus:
         question = encode(Command(arguments={"id": node, "segment": segment}))
         reply = bus.ask(keys.command(args.room, subject, "assign"), question)

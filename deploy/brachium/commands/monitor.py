@@ -5,6 +5,7 @@ brachium monitor --seconds 10
 
 import argparse
 
+from brachium.option_types import duration_s
 from brachium.shell import add_json, add_network, serve
 
 
@@ -12,7 +13,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
     """Add the monitor's options."""
     add_network(parser)
     add_json(parser)
-    parser.add_argument("--seconds", type=float, help="how long (default: until Ctrl-C)")
+    parser.add_argument("--seconds", type=duration_s, help="how long (default: until Ctrl-C)")
 
 
 def run(args: argparse.Namespace) -> int:

@@ -5,6 +5,7 @@ brachium router --port 7447
 
 import argparse
 
+from brachium.option_types import port, whole
 from brachium.shell import add_room, serve
 
 
@@ -12,8 +13,8 @@ def configure(parser: argparse.ArgumentParser) -> None:
     """Add the router's options."""
     add_room(parser)
     parser.add_argument("--bind", default="127.0.0.1", help="address of one interface")
-    parser.add_argument("--port", type=int, default=7447, help="to listen on")
-    parser.add_argument("--max-sessions", type=int, default=256, help="programs at once")
+    parser.add_argument("--port", type=port, default=7447, help="to listen on")
+    parser.add_argument("--max-sessions", type=whole(1, 65535), default=256, help="programs at once")
     parser.add_argument("--users", metavar="FILE", help="file of lines user:password; only these may attach")
     parser.add_argument(
         "--print-config",

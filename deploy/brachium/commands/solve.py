@@ -7,6 +7,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from brachium.option_types import real
 from brachium.shell import Usage, add_json, print_json
 
 if TYPE_CHECKING:
@@ -25,7 +26,9 @@ def configure(parser: argparse.ArgumentParser) -> None:
         "--filter", help="auto, vqf, complementary or complementary-printed (default: as live)"
     )
     parser.add_argument("--no-mag", action="store_true", help="leave magnetometers aside")
-    parser.add_argument("--rate", type=float, metavar="HZ", help="instants a second (default: as the input)")
+    parser.add_argument(
+        "--rate", type=real(1.0, 1000.0), metavar="HZ", help="instants a second (default: as the input)"
+    )
     parser.add_argument("--columns", metavar="GROUP,..", help="groups of columns, as in clinical,positions")
     add_json(parser)
 

@@ -5,6 +5,7 @@ brachium view --web
 
 import argparse
 
+from brachium.option_types import port_or_any
 from brachium.shell import add_network, serve
 
 
@@ -15,8 +16,8 @@ def configure(parser: argparse.ArgumentParser) -> None:
     where = parser.add_mutually_exclusive_group()
     where.add_argument("--web", action="store_true", help="as a page, even if there is a display")
     where.add_argument("--window", action="store_true", help="in a window, even if no display is found")
-    parser.add_argument("--web-port", type=int, default=9090, help="port of the page")
-    parser.add_argument("--grpc-port", type=int, default=9876, help="port of the stream")
+    parser.add_argument("--web-port", type=port_or_any, default=9090, help="port of the page")
+    parser.add_argument("--grpc-port", type=port_or_any, default=9876, help="port of the stream")
     parser.add_argument("--open", action="store_true", help="open the page in the browser")
 
 
