@@ -30,7 +30,7 @@ a hundred every 40 ms, because a round of kinematics costs about a millisecond w
 GC_ALLOCATIONS = 20_000
 """Python's 700 would look for cycles, of which messages make none, a hundred times a second."""
 
-PUT_AT_ONCE, PUT_PAUSE_S = 200, 0.001
+PUT_AT_ONCE, PUT_PAUSE_S = 100, 0.001
 """After a hold-up a thousand skeletons are due at once: pauses let the send queue take them all."""
 
 Reply = Callable[[bytes], None]
