@@ -89,7 +89,7 @@ class Stream(Generic[T]):
             except (BadKey, WireError) as error:
                 reason = error.drop.value if isinstance(error, WireError) else "bad_key"
                 if not self.drops[reason]:
-                    log.warning("dropped from %s: %s", name, error)
+                    log.warning("dropped from %r: %r", name[:80], str(error))
                 self.drops[reason] += 1
                 continue
             yield heard

@@ -58,6 +58,7 @@ class Conversation:
         self.hello: f.Hello | None = None
         self.admission: Admission | None = None
         self.closed = False
+        self.refused: Refusal | None = None  # why this side ended it, if it did
         self._said: f.NodeStatus = f.NodeStatus()
         self._asked: dict[int, int] = {}
         self._next_id = 0
@@ -110,6 +111,7 @@ class Conversation:
     def lost(self, now_ns: int, *, oversize: bool = False) -> list[Action]:
         """Take that the connection is gone: publish what is left and a last status."""
         if self.admission is None:
+            self.refused = Refusal("bad_hello", "the first frame is too large") if oversize else self.refused
             return []
         if oversize:
             self.admission.memory.drops[Drop.OVERSIZE.value] += 1
@@ -126,9 +128,8 @@ class Conversation:
         assert self.hello is not None
         memory, said = self.admission.memory, self._said
         elapsed = now_ns - self._counted_ns
-        rate = (
-            (memory.counter.received - self._counted) / (elapsed * 1e-9) if elapsed > STATUS_NS // 2 else None
-        )
+        gained = memory.counter.received - self._counted
+        rate = gained / (elapsed * 1e-9) if elapsed > STATUS_NS // 2 else None
         self._counted_ns, self._counted = now_ns, memory.counter.received
         clock = memory.clock
         return Status(
@@ -152,9 +153,7 @@ class Conversation:
 
     def _greet(self, frame: f.NodeFrame, now_ns: int) -> list[Action]:
         if not isinstance(frame, f.Hello) or self.admission is not None:
-            expected = (
-                "hello/1 comes once" if self.admission is not None else "the first frame must be hello/1"
-            )
+            expected = "the first frame must be hello/1" if self.admission is None else "hello/1 comes once"
             return self._refuse(Refusal("bad_hello", expected))
         answer = self._admit(frame)
         if isinstance(answer, Refusal):
@@ -186,7 +185,7 @@ class Conversation:
         if isinstance(frame, f.ClockAnswer):
             return self._answer(frame, now_ns)
         if isinstance(frame, f.NodeStatus):
-            self._said = frame
+            self._said = f.checked_status(frame)
             return []
         assert isinstance(frame, f.Bye)
         released = self._release()
@@ -242,6 +241,7 @@ class Conversation:
         self.admission.memory.drops[error.drop.value] += 1
 
     def _refuse(self, refusal: Refusal) -> list[Action]:
+        self.refused = refusal
         frame = f.Refused(code=refusal.code, reason=refusal.reason, retry_s=refusal.retry_s)
         return [Send(encode(frame)), *self._close(f.CLOSE_CODES[refusal.code], refusal.reason)]
 

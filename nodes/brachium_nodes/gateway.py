@@ -144,7 +144,7 @@ class Gateway:
         answer = self._roster.admit(hello, token, other)
         if isinstance(answer, Refusal):
             self._heart.counts["refused"] += 1
-            log.info("node %s refused: %s", hello.node[:64], answer.reason)
+            log.info("node %r refused: %r", hello.node[:64], answer.reason)
             return answer
         if answer.replaces:
             old = self._connections[hello.node]
@@ -160,6 +160,8 @@ class Gateway:
 
     def _left(self, connection: Connection) -> None:
         hello, admission = connection.conversation.hello, connection.conversation.admission
+        if (refused := connection.conversation.refused) is not None and refused.code == "bad_hello":
+            self._heart.drops["bad_hello"] += 1
         if hello is None or admission is None or self._connections.get(hello.node) is not connection:
             return
         del self._connections[hello.node]
@@ -216,7 +218,7 @@ class Gateway:
         reason = self._roster.assign(node, subject, segment, mounting)
         if reason:
             return reason
-        log.warning("node %s is now %s of %s; put it into the site file to keep it", node, segment, subject)
+        log.warning("node %r is now %s of %s; put it into the site file to keep it", node, segment, subject)
         connection = self._connections.get(node)
         if connection is not None:
             self._expel(connection, Refusal("reassigned", f"assigned to {segment} of {subject}", 0.0))
@@ -236,9 +238,7 @@ def _address(bind: str) -> str:
     try:
         address = ipaddress.ip_address(bind)
     except ValueError:
-        raise CannotListen(
-            f"--bind {bind!r} is no address; give one of this machine, as in 127.0.0.1"
-        ) from None
+        raise CannotListen(f"--bind {bind!r} is no address; write one, as 127.0.0.1") from None
     if address.is_unspecified:
         raise CannotListen(f"--bind {bind} would listen everywhere; give the address of one interface")
     return str(address)

@@ -144,6 +144,26 @@ _FROM_NODE: dict[str, type[Message]] = {
 _FROM_GATEWAY: dict[str, type[Message]] = {"welcome/1": Welcome, "clock/1": ClockAsk, "refused/1": Refused}
 
 
+_STATUS_BOUNDS = {
+    "battery_v": (0.0, 10.0),
+    "battery_hours": (0.0, 100_000.0),
+    "rssi_dbm": (-200.0, 50.0),
+    "dropped": (0, 1 << 48),
+}
+"""What a node can truly say of itself: one cell or two, years, any radio, a count."""
+
+
+def checked_status(status: NodeStatus) -> NodeStatus:
+    """Return `status`, or raise WireError when a node says of itself what cannot be."""
+    for name, (low, high) in _STATUS_BOUNDS.items():
+        value = getattr(status, name)
+        if value is not None and not low <= value <= high:
+            raise WireError(
+                Drop.OUT_OF_RANGE, f"status/1: {name} {value:g} is not within {low:g} to {high:g}"
+            )
+    return status
+
+
 def from_node(payload: bytes | str) -> NodeFrame:
     """Return the frame that a node sent, or raise WireError."""
     frame = _decode(payload, _FROM_NODE)

@@ -83,7 +83,7 @@ async def join(stream: NodeStream, sink: Sink, stop: Stop) -> None:
                 raise
             reason, wait_s = str(error), max(error.retry_s, RETRY_S)
         if reason != said:
-            log.warning("%s: %s", stream.hello.node, reason)
+            log.warning("%s: %r", stream.hello.node, reason)
         said = reason
         for _ in range(round(wait_s / LOOK_S)):
             if not stop.is_set():

@@ -191,6 +191,9 @@ def test_published_times_increase_and_out_of_order_ones_lie_before() -> None:
         ("wrong_type", msgpack.packb({"m": "bye/1"})),
         ("oversize", msgpack.packb({"m": "batch/1", "x": bytes(5000)})),
         ("not_finite", msgpack.packb({"m": "status/1", "bat": float("nan")})),
+        ("out_of_range", f.NodeStatus(battery_v=1e9)),
+        ("out_of_range", f.NodeStatus(battery_v=-0.1)),
+        ("out_of_range", f.NodeStatus(dropped=-1)),
         ("not_finite", raw(acc=b"\0\0\xc0\x7f" * 3, gyr=bytes(12))),
         ("out_of_range", raw(acc=struct.pack("<3f", 0, 600, 0), gyr=bytes(12))),
         ("out_of_range", raw(sequence=-1, **still(1))),
@@ -218,8 +221,24 @@ def test_a_bad_frame_is_counted_by_name_and_nothing_else_is_disturbed(drop: str,
     assert node.status().drops == {drop: 1}
     assert node.status().received == 10
     assert node.status().lost == 0
+    assert node.status().battery_v is None
     assert node.closed is None
     assert len(node.of(SampleBatch)) == 2
+
+
+def test_bad_frames_before_the_clock_is_known_are_counted_too() -> None:
+    node = Node(Roster((ENTRY,))).hello()
+    node.now += 50 * MS
+    node.say(node.batch(0))
+    node.say(b"\xc1")
+    node.say(raw(acc=struct.pack("<3f", 0, 1e9, 0), gyr=bytes(12)))
+    node.say(node.batch(0))
+    node.say(raw(sequence=5, device_us=1 << 45, **still(1)))
+    assert node.of(SampleBatch) == []
+    node.answer_clock()
+    assert node.status().drops == {"malformed": 1, "out_of_range": 2, "repeated": 5}
+    assert node.status().received == 5
+    assert len(node.of(SampleBatch)) == 1
 
 
 def test_a_batch_whose_clock_went_back_is_dropped() -> None:

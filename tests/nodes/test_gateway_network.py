@@ -98,6 +98,64 @@ def test_what_a_node_sends_arrives_counted_exactly(gateway, listener, bus) -> No
     assert topics.index("info") < topics.index("imu")
 
 
+def test_bad_frames_are_counted_by_name_beside_the_good_ones(gateway, listener) -> None:
+    url = gateway(entry("n1", "forearm_r")).url
+    bad = [
+        b"\xc1",
+        b"\xff" * 40,
+        encode(
+            f.Batch(sequence=5, device_us=BOOT_US, offsets=bytes(4), acc=b"\0\0\xc0\x7f" * 3, gyr=bytes(12))
+        ),
+        encode(f.Batch(sequence=5, device_us=BOOT_US, offsets=bytes(4), acc=bytes(11), gyr=bytes(12))),
+        encode(
+            f.Batch(
+                sequence=5, device_us=BOOT_US, offsets=bytes(4), acc=b"\x28\x6b\x6e\x4e" * 3, gyr=bytes(12)
+            )
+        ),
+        encode(f.NodeStatus(battery_v=1e6)),
+    ]
+
+    async def work() -> None:
+        async with connect(url, additional_headers={"Authorization": "Bearer secret"}) as socket:
+            await socket.send(encode(f.Hello(node="n1", boot=1, chip="MPU-9150", rate_hz=100.0)))
+            await socket.send(encode(batch(0)))
+            for frame in bad:
+                await socket.send(frame)
+            await socket.send(encode(batch(5)))
+            await socket.send(encode(batch(5)))
+            await socket.send(encode(f.Bye(next_sequence=10)))
+            await until(lambda: [s for s in listener.of("status") if not s.connected], "the last status")
+
+    play(work)
+    last = listener.of("status")[-1]
+    assert (last.received, last.lost) == (10, 0)
+    assert last.battery_v is None
+    assert last.drops == {
+        "malformed": 2,
+        "not_finite": 1,
+        "wrong_shape": 1,
+        "out_of_range": 2,
+        "repeated": 5,
+    }
+    assert [b.sequence for b in listener.of("imu", "forearm_r")] == [0, 5]
+
+
+@pytest.mark.parametrize("first", [b"\xc1", encode(f.Bye(next_sequence=1)), bytes(9000)])
+def test_a_bad_first_frame_is_counted_at_the_gateway(gateway, listener, first: bytes) -> None:
+    url = gateway(entry("n1", "forearm_r")).url
+
+    async def work() -> None:
+        async with connect(url, additional_headers={"Authorization": "Bearer secret"}) as socket:
+            await socket.send(first)
+            await socket.wait_closed()
+        await until(
+            lambda: any(h.drops == {"bad_hello": 1} for h in listener.of("health") if h.kind == "gateway"),
+            "the gateway's count",
+        )
+
+    play(work)
+
+
 def test_host_times_are_the_gateway_s(gateway, listener, bus) -> None:
     url = gateway(entry("n1", "forearm_r")).url
     clock = follow_host_time(bus, ROOM, "gw-a")

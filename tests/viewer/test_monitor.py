@@ -11,6 +11,7 @@ import pytest
 from brachium_router import service as router
 from brachium_router.config import RouterSettings
 from brachium_viewer import monitor
+from brachium_viewer.health import Network
 from brachium_viewer.monitor import MonitorSettings
 from brachium_wire import keys
 from brachium_wire.bus import Bus
@@ -84,3 +85,12 @@ def test_a_pipe_gets_plain_blocks(bus: Bus) -> None:
     monitor.run(MonitorSettings(endpoint=bus.endpoint, room=ROOM, seconds=20.0), stop, out)
     assert out.getvalue().startswith("0 of 0 nodes live\n")
     assert "\x1b" not in out.getvalue()
+
+
+def test_what_a_node_sent_in_vain_stands_beside_it() -> None:
+    network = Network()
+    status = Status(
+        node="n7", time_ns=1, connected=True, received=9, lost=0, out_of_order=0, drops={"malformed": 3}
+    )
+    network.feed(keys.status(ROOM, "p01", "hand_r"), encode(status), 1)
+    assert "  p01/hand_r dropped 3 malformed\n" in monitor.block(network.report(2))

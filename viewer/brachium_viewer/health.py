@@ -37,6 +37,7 @@ class NodeHealth:
     battery_hours: float | None = None
     rssi_dbm: float | None = None
     clock_uncertainty_ms: float | None = None
+    drops: dict[str, int] = field(default_factory=dict)
 
     @property
     def loss(self) -> float:
@@ -111,11 +112,9 @@ class Network:
             if parsed.topic not in ("imu", "info", "status", "skeleton", "health"):
                 return
             message = decode_topic(payload, parsed.topic)
-        except keys.BadKey:
-            self.drops["bad_key"] = self.drops.get("bad_key", 0) + 1
-            return
-        except WireError as error:
-            self.drops[error.drop.value] = self.drops.get(error.drop.value, 0) + 1
+        except (keys.BadKey, WireError) as error:
+            reason = error.drop.value if isinstance(error, WireError) else "bad_key"
+            self.drops[reason] = self.drops.get(reason, 0) + 1
             return
         who = (parsed.subject, parsed.detail)
         if isinstance(message, SampleBatch):
@@ -197,6 +196,7 @@ class _Node:
             battery_hours=status.battery_hours if status is not None else None,
             rssi_dbm=status.rssi_dbm if status is not None else None,
             clock_uncertainty_ms=None if uncertainty is None else uncertainty / 1e6,
+            drops=dict(status.drops) if status is not None else {},
         )
 
 
@@ -213,8 +213,7 @@ class _Arm:
         self.window.add(now_ns, 1, latency)
 
     def report(self, subject: str, side: str, now_ns: int) -> ArmHealth:
-        latencies = self.window.values(now_ns)
-        p50, p99 = percentiles(latencies)
+        p50, p99 = percentiles(self.window.values(now_ns))
         age_s = self.window.age_s(now_ns)
         return ArmHealth(
             subject=subject,

@@ -86,6 +86,9 @@ def block(health: NetworkHealth, *, colour: bool = False) -> str:
                 _row(head, widths),
                 *(_paint(_row(cells, widths), state, colour) for cells, state in rows),
             ]
+    lines += [
+        f"  {n.subject}/{n.segment} dropped {_counts(n.drops)}" for n in health.nodes if any(n.drops.values())
+    ]
     if health.services:
         up = [f"{s.kind}/{s.id}" for s in health.services if s.up]
         down = [f"{s.kind}/{s.id}" for s in health.services if not s.up]
@@ -93,16 +96,18 @@ def block(health: NetworkHealth, *, colour: bool = False) -> str:
         if down:
             lines.append(_paint(f"services DOWN: {', '.join(down)}", "missing", colour))
         lines += [
-            f"  {s.kind}/{s.id} dropped {', '.join(f'{n} {name}' for name, n in s.drops.items() if n)}"
-            for s in health.services
-            if any(s.drops.values())
+            f"  {s.kind}/{s.id} dropped {_counts(s.drops)}" for s in health.services if any(s.drops.values())
         ]
     if health.drops:
-        lines.append(f"not readable here: {', '.join(f'{n} {name}' for name, n in health.drops.items())}")
+        lines.append(f"not readable here: {_counts(health.drops)}")
     if not health.nodes and not health.services:
         lines.append("nobody here yet: start a gateway, or: brachium emulate")
     text = "\n".join(lines) + "\n"
     return _CLEAR + text if colour else text + "\n"
+
+
+def _counts(drops: dict[str, int]) -> str:
+    return ", ".join(f"{n} {name}" for name, n in drops.items() if n)
 
 
 def _unworn(health: NetworkHealth) -> str:

@@ -169,7 +169,7 @@ def _snapshot(bus: Bus, room: str, subject: str) -> tuple[str, bytes] | None:
             raise WireError(Drop.MALFORMED, answer.reason or "the answer holds no snapshot")
         decode(payload, Snapshot, limit)
     except WireError as error:
-        log.warning("the recording begins without fusion's state of %s: %s", subject, error)
+        log.warning("the recording begins without fusion's state of %s: %r", subject, str(error))
         return None
     return keys.snapshot(room, subject), payload
 

@@ -294,12 +294,12 @@ class Bus:
                     query.reply(key, answer)
                     query.drop()  # type: ignore[no-untyped-call]  # as Zenoh types it; the asker waits no longer
                 except zenoh.ZError as error:
-                    log.debug("nobody waits for the answer on %s any more: %s", key, error)
+                    log.debug("nobody waits for the answer on %r any more: %s", key, error)
 
             try:
                 asked(key, b"" if question is None else question.to_bytes(), reply)
             except Exception as error:
-                log.exception("answering %s", key)
+                log.exception("answering %r", key[:80])
                 reason = f"failed inside: {_line(error)}; see the service's log"
                 reply(encode(Answer(ok=False, reason=reason)))
 
