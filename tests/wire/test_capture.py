@@ -144,22 +144,38 @@ def test_a_wrong_segment_file_is_named_in_one_line(tmp_path: Path, text: str, sa
 @pytest.mark.parametrize(
     ("toml", "said"),
     [
-        ("side = 'up'", "side"),
+        ("side = 'up'", "side: 'up' is not known; write right, left or both"),
+        ("side = 3", "side: expected right, left or both, came a whole number"),
         ("heigth_m = 1.8", "'heigth_m'; did you mean 'height_m'"),
-        ("height_m = -1", "positive"),
-        ("height_m = 'tall'", "height_m"),
+        ("height_m = -1", "height_m = -1: expected metres, above 0 and at most 3"),
+        ("height_m = 'tall'", "height_m: expected a number, came text"),
+        ("lengths_m = { hand = 19 }", "lengths_m.hand = 19: expected metres"),
+        ("lengths_m = { foot = 1 }", "lengths_m: 'foot' is not known; write chest_to_shoulder, upper_arm, "),
+        ("rate_hz = '100'", "rate_hz: expected a number, came text"),
+        ("rate_hz = 0", "rate_hz = 0: expected 1 to 2000"),
+        ("rate_hz = 2001", "rate_hz = 2001: expected 1 to 2000"),
+        ("facing_deg = 361", "facing_deg = 361: expected degrees, -360 to 360"),
+        ("facing_deg = nan", "facing_deg = nan: expected degrees, -360 to 360"),
+        ("mounting = 3", "mounting: expected a table"),
+        ("sensor = { forearm_r = 3 }", "sensor.forearm_r: expected a table"),
+        ("joint = 3", "joint: expected a table"),
         ("[mounting]\nforarm_r = [1,0,0,0]", "did you mean 'forearm_r'"),
         ("[mounting]\nforearm_r = [1,1,0,0]", "no rotation"),
-        ("[mounting]\nforearm_r = [1,0,0]", "mounting"),
+        ("[mounting]\nforearm_r = [1,0,0]", "mounting: expected 4 numbers, came 3"),
+        ("[mounting]\nforearm_r = [nan,0,0,0]", "no rotation"),
         ("[sensor.forearm_r]\ngyro_bais = [0,0,0]", "did you mean 'gyro_bias'"),
         ("[calibration]\npose = 'n-pose'", "to_s"),
-        ("[calibration]\npose = 'lotus'\nto_s = 3", "pose"),
+        (
+            "[calibration]\npose = 'lotus'\nto_s = 3",
+            "calibration.pose: 'lotus' is not known; write n-pose",
+        ),
         ("[calibration]\nfrom_s = 4\nto_s = 3", "must come after"),
         ("[calibration]\nform_s = 4", "calibration: unknown entry 'form_s'; did you mean 'from_s'"),
         ("[[calibration.functional]]\nmotion = 'free'\nfrom_s = 4\nto_s = 4", "functional"),
+        ("[[calibration.functional]]\nmotion = 'free'\nto_s = 4", "functional.0.: from_s is missing"),
         ("[joint.elbow]\naxes = 4", "1, 2 or 3"),
         ("[joint.elbow]\naxes = 2\nfrom_forearm = [0,0,0]", "did you mean 'from_forearm_r'"),
-        ("[joint.knee]\naxes = 2", "joint"),
+        ("[joint.knee]\naxes = 2", "joint: 'knee' is not known; joints are shoulder, elbow, wrist"),
         ("side = ", "not TOML"),
     ],
 )
@@ -168,6 +184,14 @@ def test_a_wrong_entry_is_named_in_one_line(tmp_path: Path, toml: str, said: str
         capture.load(folder(tmp_path, toml=toml))
     assert "capture.toml" in str(caught.value)
     assert "\n" not in str(caught.value)
+    assert "`" not in str(caught.value)  # the marks of the library's own words
+
+
+def test_a_capture_toml_that_is_no_text_says_so(tmp_path: Path) -> None:
+    path = folder(tmp_path)
+    (path / "capture.toml").write_bytes(b"title = '\xff\xfe'")
+    with pytest.raises(CaptureError, match=r"capture\.toml: not text \(UTF-8\)"):
+        capture.load(path)
 
 
 def test_a_misspelt_segment_is_named_with_the_nearest(tmp_path: Path) -> None:

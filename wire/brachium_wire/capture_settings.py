@@ -1,21 +1,26 @@
 """capture.toml: what a person says of a capture, read with every name checked."""
 
-import difflib
 import json
-import re
 import tomllib
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 import msgspec
 import numpy as np
 
 from brachium_body.segments import SEGMENTS, Segment
+from brachium_wire.capture_words import in_words, nearest
 from brachium_wire.messages import Quaternion, SensorCalibration, Vector
+from brachium_wire.plausible import MAX_HEIGHT_M
 
 Pose = Literal["n-pose", "table", "given"]
 Motion = Literal["elbow-flexion", "pronation", "free"]
+Side = Literal["right", "left", "both"]
+Length = Literal["chest_to_shoulder", "upper_arm", "forearm", "hand"]
+JointName = Literal["shoulder", "elbow", "wrist"]
+
+MIN_RATE_HZ, MAX_RATE_HZ = 1.0, 2000.0
 
 
 class CaptureError(ValueError):
@@ -67,18 +72,16 @@ class CaptureSettings(_Strict, frozen=True, kw_only=True):
     title: str = ""
     source: str = ""
     licence: str = ""
-    side: Literal["right", "left", "both"] = "right"
+    side: Side = "right"
     rate_hz: float | None = None
     height_m: float | None = None
-    lengths_m: dict[Literal["chest_to_shoulder", "upper_arm", "forearm", "hand"], float] = msgspec.field(
-        default_factory=dict
-    )
+    lengths_m: dict[Length, float] = msgspec.field(default_factory=dict)
     facing_deg: float | None = None
     mounting: dict[Segment, Quaternion] = msgspec.field(default_factory=dict)
     """segment_from_sensor, of length 1."""
     sensor: dict[Segment, SensorCalibration] = msgspec.field(default_factory=dict)
     calibration: CalibrationSpans = CalibrationSpans()
-    joint: dict[Literal["shoulder", "elbow", "wrist"], Joint] = msgspec.field(default_factory=dict)
+    joint: dict[JointName, Joint] = msgspec.field(default_factory=dict)
     truth: Truth = Truth()
 
 
@@ -86,35 +89,45 @@ def read_settings(path: Path) -> CaptureSettings:
     """Return what a capture.toml says, or raise CaptureError naming the entry that is wrong."""
     try:
         content = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+    except UnicodeDecodeError:
+        raise CaptureError(f"{path}: not text (UTF-8)") from None
+    except tomllib.TOMLDecodeError as error:
         raise CaptureError(f"{path}: not TOML: {error}") from None
     try:
         _check_names(content)
         content["joint"] = {name: _joint(name, entries) for name, entries in content.get("joint", {}).items()}
         settings = msgspec.convert(content, CaptureSettings)
         _check(settings)
-    except (msgspec.ValidationError, CaptureError) as error:
-        raise CaptureError(f"{path}: {_plain(str(error))}") from None
+    except msgspec.ValidationError as error:
+        raise CaptureError(f"{path}: {in_words(str(error), _CHOICES, _KNOWN)}") from None
+    except CaptureError as error:
+        raise CaptureError(f"{path}: {error}") from None
     return _normalized(settings)
 
 
 def _check_names(content: Mapping[str, Any]) -> None:
+    for name in ("mounting", "sensor", "joint"):
+        _check_table(name, content.get(name, {}))
+    for joint in content.get("joint", {}):
+        if joint not in get_args(JointName):
+            raise CaptureError(f"joint: {joint!r} is not known; joints are {', '.join(get_args(JointName))}")
     for name in ("mounting", "sensor"):
         for segment in content.get(name, {}):
             _known(segment, SEGMENTS, f"{name}: unknown segment")
     for segment, entries in content.get("sensor", {}).items():
+        _check_table(f"sensor.{segment}", entries)
         for entry in entries:
             _known(entry, SensorCalibration.__struct_encode_fields__, f"sensor.{segment}: unknown entry")
 
 
+def _check_table(name: str, entries: Any) -> None:
+    if not isinstance(entries, dict):
+        raise CaptureError(f"{name}: expected a table, [{name}], came {entries!r}")
+
+
 def _known(name: str, names: tuple[str, ...], what: str) -> None:
     if name not in names:
-        raise CaptureError(f"{what} {name!r}{_nearest(name, names)}")
-
-
-def _nearest(name: str, names: tuple[str, ...]) -> str:
-    near = difflib.get_close_matches(name, names, n=1, cutoff=0.6)
-    return f"; did you mean {near[0]!r}?" if near else f"; known are {', '.join(names)}"
+        raise CaptureError(f"{what} {name!r}{nearest(name, names)}")
 
 
 def _joint(name: str, entries: Any) -> dict[str, Any]:
@@ -132,7 +145,12 @@ def _joint(name: str, entries: Any) -> dict[str, Any]:
     return {"axes": entries["axes"], "centre_from": centres}
 
 
-_UNKNOWN = re.compile(r"Object contains unknown field `(?P<name>.*?)`")
+_CHOICES = {
+    "side": get_args(Side),
+    "pose": get_args(Pose),
+    "motion": get_args(Motion),
+    "lengths_m": get_args(Length),
+}
 _KNOWN: tuple[str, ...] = tuple(
     dict.fromkeys(
         name
@@ -142,25 +160,19 @@ _KNOWN: tuple[str, ...] = tuple(
 )
 
 
-def _plain(text: str) -> str:
-    """Return a validation message in the words of the file."""
-    where = ""
-    if " - at `" in text:
-        text, _, where = text.partition(" - at `")
-        where = re.sub(r"^(key in )?\$\.?", "", where.rstrip("`"))
-    if match := _UNKNOWN.search(text):
-        text = f"unknown entry {match['name']!r}{_nearest(match['name'], _KNOWN)}"
-    return f"{where}: {text}" if where else text
-
-
 def _check(settings: CaptureSettings) -> None:
-    for name, value in (
-        ("rate_hz", settings.rate_hz),
-        ("height_m", settings.height_m),
-        *settings.lengths_m.items(),
-    ):
-        if value is not None and not 0.0 < value < 1e4:
-            raise CaptureError(f"{name} = {value}: expected a positive number")
+    if settings.rate_hz is not None and not MIN_RATE_HZ <= settings.rate_hz <= MAX_RATE_HZ:
+        raise CaptureError(
+            f"rate_hz = {settings.rate_hz:g}: expected {MIN_RATE_HZ:g} to {MAX_RATE_HZ:g} samples a second"
+        )
+    lengths = {f"lengths_m.{name}": length for name, length in settings.lengths_m.items()}
+    for entry, metres in {"height_m": settings.height_m, **lengths}.items():
+        if metres is not None and not 0.0 < metres <= MAX_HEIGHT_M:
+            raise CaptureError(f"{entry} = {metres:g}: expected metres, above 0 and at most {MAX_HEIGHT_M:g}")
+    angles = {f"calibration.angles_deg.{name}": a for name, a in settings.calibration.angles_deg.items()}
+    for entry, degrees in {"facing_deg": settings.facing_deg, **angles}.items():
+        if degrees is not None and not -360.0 <= degrees <= 360.0:
+            raise CaptureError(f"{entry} = {degrees:g}: expected degrees, -360 to 360")
     spans = settings.calibration
     if spans.pose is not None and spans.to_s is None:
         raise CaptureError("calibration: a pose needs to_s, the second at which it ends")
@@ -173,11 +185,11 @@ def _check(settings: CaptureSettings) -> None:
             raise CaptureError(
                 f"calibration.functional {span.motion}: to_s must come after from_s, from 0 on"
             )
-    for name, joint in settings.joint.items():
+    for joint_name, joint in settings.joint.items():
         if joint.axes not in (1, 2, 3):
-            raise CaptureError(f"joint.{name}: axes = {joint.axes}; a joint has 1, 2 or 3")
+            raise CaptureError(f"joint.{joint_name}: axes = {joint.axes}; a joint has 1, 2 or 3")
     for name, q in settings.mounting.items():
-        if abs(float(np.linalg.norm(q)) - 1.0) > 0.01:
+        if not abs(float(np.linalg.norm(q)) - 1.0) <= 0.01:  # true for NaN too
             raise CaptureError(
                 f"mounting.{name}: {list(q)} is no rotation; a quaternion w x y z has length 1"
             )
