@@ -83,7 +83,8 @@ def test_what_makes_no_table_is_refused(tmp_path: Path, columns: Any, units: Any
     [
         ("a;b\n1;2\n", "semicolons"),
         ("a,a\n1,2\n", "every column once"),
-        ("", "every column once"),
+        ("", "the file is empty"),
+        ("\n1,2\n", "every column once"),
         ("a,b\n1\n", "data row 1 has 1 cells"),
     ],
 )
@@ -92,6 +93,18 @@ def test_a_csv_file_that_is_no_table_gives_one_line(tmp_path: Path, content: str
     with pytest.raises(table.TableError, match=said) as caught:
         table.read(tmp_path / "a.csv")
     assert "\n" not in str(caught.value)
+
+
+def test_a_csv_file_that_is_no_text_says_so(tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_bytes(b"t,x\n0,\xff\n")
+    with pytest.raises(table.TableError, match=r"a\.csv: not text \(UTF-8\)"):
+        table.read(tmp_path / "a.csv")
+
+
+def test_an_empty_parquet_file_says_so(tmp_path: Path) -> None:
+    (tmp_path / "a.parquet").touch()
+    with pytest.raises(table.TableError, match="the file is empty"):
+        table.read(tmp_path / "a.parquet")
 
 
 def test_spreadsheet_files_with_a_byte_order_mark_and_crlf_are_read(tmp_path: Path) -> None:

@@ -72,11 +72,11 @@ def read(path: Path) -> Table:
     Whole numbers come as int64, true and false as bool, other numbers as float64 with NaN where nothing is
     known, all else as text. Raises TableError, or FileNotFoundError.
     """
-    if path.suffix == ".csv":
-        return _read_csv(path)
-    if path.suffix == ".parquet":
-        return _read_parquet(path)
-    raise TableError(f"{path}: a table's name ends in .csv or .parquet")
+    if path.suffix not in (".csv", ".parquet"):
+        raise TableError(f"{path}: a table's name ends in .csv or .parquet")
+    if path.stat().st_size == 0:
+        raise TableError(f"{path}: the file is empty")
+    return _read_csv(path) if path.suffix == ".csv" else _read_parquet(path)
 
 
 def _checked(name: str, values: npt.ArrayLike) -> Column:
@@ -125,7 +125,9 @@ def _read_csv(path: Path) -> Table:
         try:
             head = _after_comments(file, metadata)
             rows = list(csv.reader(file))
-        except (UnicodeDecodeError, csv.Error) as error:
+        except UnicodeDecodeError:
+            raise TableError(f"{path}: not text (UTF-8)") from None
+        except csv.Error as error:
             raise TableError(f"{path}: no CSV file ({error})") from None
     if "," not in head and ";" in head:
         raise TableError(f"{path}: separated by semicolons; write commas between cells and decimal points")
