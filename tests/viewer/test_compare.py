@@ -34,6 +34,23 @@ def columns(stem: str, q: Any) -> dict[str, Any]:
     return {f"{stem}_q{part}": q[:, i] for i, part in enumerate("wxyz")}
 
 
+@pytest.mark.parametrize("lag", [float("nan"), float("inf"), float("-inf")])
+def test_a_lag_that_is_no_number_is_refused(lag: float) -> None:
+    same = Table({"time": TIME, "elbow_flexion": TIME}, {"elbow_flexion": "deg"})
+    with pytest.raises(TableError, match="lag = -?(nan|inf): expected seconds"):
+        compare_tables(same, same, CompareSettings(lag=lag))
+
+
+@pytest.mark.parametrize(("error", "shown"), [(5e-10, "0"), (-5e-10, "0"), (2e-9, "2e-09")])
+def test_angles_of_rounding_size_are_shown_as_0(error: float, shown: str) -> None:
+    b = Table({"time": TIME, "elbow_flexion": 0.0 * TIME}, {"elbow_flexion": "deg"})
+    a = Table({"time": TIME, "elbow_flexion": 0.0 * TIME + error}, {"elbow_flexion": "deg"})
+    found = compare_tables(a, b, CompareSettings())
+    assert found.columns["elbow_flexion"].bias == pytest.approx(error)  # the figure itself stays
+    line = compare.text(found).splitlines()[-1].removeprefix("elbow_flexion, deg").split()
+    assert line == [shown, shown, "0", shown, str(N)]
+
+
 def test_columns_give_bias_spread_and_largest() -> None:
     swing = np.where(np.arange(N) % 2, 1.0, -1.0)
     b = Table({"time": TIME, "elbow_flexion": 170.0 * np.sin(TIME), "only_b": TIME}, {"elbow_flexion": "deg"})

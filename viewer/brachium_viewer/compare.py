@@ -18,6 +18,9 @@ from brachium_wire.table import Table, TableError
 Floats = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]
 
+ROUNDING_DEG = 1e-9
+"""Smaller angles are what float64 leaves over; people are shown 0."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class CompareSettings:
@@ -88,6 +91,8 @@ def compare_tables(
     a: Table, b: Table, settings: CompareSettings, names: tuple[str, str] = ("a", "b")
 ) -> Comparison:
     """Compare two tables: every common column of numbers, and every common orientation."""
+    if settings.lag != "estimate" and not np.isfinite(settings.lag):
+        raise TableError(f"lag = {settings.lag}: expected seconds, a finite number, or the word estimate")
     both = _Pair(a, b, settings, names)
     if not both.stems and not both.numbers:
         raise TableError(f"{names[0]} and {names[1]} have no column in common that could be compared")
@@ -232,4 +237,8 @@ def text(comparison: Comparison) -> str:
 
 
 def _line(name: str, e: ErrorFigures) -> str:
-    return f"{name:<44}{e.rmse:>10.4g}{e.bias:>10.3g}{e.sd:>10.3g}{e.max_abs:>10.4g}{e.n:>9}"
+    rmse, bias, sd, largest = (
+        0.0 if name.endswith("deg") and abs(x) < ROUNDING_DEG else x
+        for x in (e.rmse, e.bias, e.sd, e.max_abs)
+    )
+    return f"{name:<44}{rmse:>10.4g}{bias:>10.3g}{sd:>10.3g}{largest:>10.4g}{e.n:>9}"

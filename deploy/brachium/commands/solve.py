@@ -4,6 +4,8 @@ brachium solve recording.mcap --out angles.csv
 """
 
 import argparse
+import math
+import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -15,9 +17,13 @@ if TYPE_CHECKING:
     from brachium_fusion.solve import SolveReport
 
 
+SAME_RAD = 1e-6
+"""Live and solved are the same sums; apart by more, they did not have the same samples."""
+
+
 def configure(parser: argparse.ArgumentParser) -> None:
     """Add the options."""
-    parser.add_argument("input", type=Path, metavar="INPUT", help="a recording (.mcap) or a capture folder")
+    parser.add_argument("input", type=_given, metavar="INPUT", help="a recording (.mcap) or a capture folder")
     parser.add_argument(
         "--out", type=Path, metavar="FILE", help=".csv or .parquet; without it only the figures"
     )
@@ -41,6 +47,8 @@ def run(args: argparse.Namespace) -> int:
 
     if args.filter is not None and args.filter not in FILTERS:
         raise Usage(f"--filter {args.filter!r} is not known; choose one of {', '.join(FILTERS)}")
+    if args.out is not None:
+        _check_writable(args.out)
     report = solve.run(
         solve.SolveSettings(
             input=args.input,
@@ -60,8 +68,25 @@ def run(args: argparse.Namespace) -> int:
 
 
 def figures(report: "SolveReport") -> dict[str, object]:
-    """Return the report without the skeletons themselves."""
-    return {name: getattr(report, name) for name in report.__slots__ if name != "skeletons"}
+    """Return the report without the skeletons themselves; what JSON cannot say, infinity, is None."""
+    found = {name: getattr(report, name) for name in report.__slots__ if name != "skeletons"}
+    return {n: None if isinstance(x, float) and not math.isfinite(x) else x for n, x in found.items()}
+
+
+def _given(text: str) -> Path:
+    if not text.strip():
+        raise argparse.ArgumentTypeError("give a recording or a capture folder")
+    return Path(text)
+
+
+def _check_writable(out: Path) -> None:
+    """Refuse, before minutes of solving, what could not be written after them."""
+    if out.suffix not in (".csv", ".parquet"):
+        raise Usage(f"--out {out}: a table's name ends in .csv or .parquet")
+    if not out.parent.is_dir():
+        raise Usage(f"--out {out}: there is no folder {out.parent}; make it first")
+    if out.is_dir() or not os.access(out if out.exists() else out.parent, os.W_OK):
+        raise Usage(f"--out {out}: cannot be written in folder {out.parent}; choose another")
 
 
 def _groups(text: str | None, known: "tuple[Group, ...]") -> "tuple[Group, ...]":
@@ -82,12 +107,19 @@ def _words(source: Path, report: "SolveReport") -> str:
     for segment, counts in report.quality.items():
         lines.append(f"  {segment}: " + ", ".join(f"{n} {quality}" for quality, n in counts.items()))
     if report.live_compared:
-        lines.append(
-            f"beside {report.live_compared} live skeletons: at most {report.live_angle_rad:.1e} rad "
-            f"and {report.live_position_m:.1e} m apart"
-        )
+        lines.append(f"beside {report.live_compared} live skeletons: {_beside_live(report)}")
     lines += [f"not used: {count} ({reason})" for reason, count in report.drops.items()]
     lines += [f"warning: {warning}" for warning in report.warnings]
     if report.out is not None:
         lines.append(f"wrote {report.out}")
     return "\n".join(lines)
+
+
+def _beside_live(report: "SolveReport") -> str:
+    angle, position = report.live_angle_rad, report.live_position_m
+    if angle is None or position is None or not angle <= SAME_RAD:
+        apart = (
+            f" (up to {math.degrees(angle):.2g} deg)" if angle is not None and math.isfinite(angle) else ""
+        )
+        return f"differs from what was live{apart}: the recording is damaged, or fusion restarted during it"
+    return f"at most {angle:.1e} rad and {position:.1e} m apart"
