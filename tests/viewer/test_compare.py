@@ -37,7 +37,7 @@ def columns(stem: str, q: Any) -> dict[str, Any]:
 @pytest.mark.parametrize("lag", [float("nan"), float("inf"), float("-inf")])
 def test_a_lag_that_is_no_number_is_refused(lag: float) -> None:
     same = Table({"time": TIME, "elbow_flexion": TIME}, {"elbow_flexion": "deg"})
-    with pytest.raises(TableError, match="lag = -?(nan|inf): expected seconds"):
+    with pytest.raises(TableError, match=r"lag = -?(nan|inf): expected seconds"):
         compare_tables(same, same, CompareSettings(lag=lag))
 
 
