@@ -65,14 +65,14 @@ class Stream(Generic[T]):
         self.drops: Counter[str] = Counter()
 
     def __iter__(self) -> Iterator[tuple[Key, T]]:
-        with _close_at_exit(Bus.open(self._endpoint)) as bus:
+        with _join(self._endpoint) as bus:
             inbox = bus.subscribe(self._expression)
             while True:
                 yield from self._take(inbox)
                 inbox.wait(LOOK_S)
 
     async def __aiter__(self) -> AsyncIterator[tuple[Key, T]]:
-        with _close_at_exit(await asyncio.to_thread(Bus.open, self._endpoint)) as bus:
+        with await asyncio.to_thread(_join, self._endpoint) as bus:
             loop, arrived = asyncio.get_running_loop(), asyncio.Event()
             inbox = bus.subscribe(self._expression)
             inbox.on_arrival(lambda: _call(loop, arrived.set))
@@ -107,6 +107,13 @@ def _samples(topic: str, payload: bytes) -> Samples:
 def _call(loop: asyncio.AbstractEventLoop, what: Callable[[], object]) -> None:
     if not loop.is_closed():
         loop.call_soon_threadsafe(what)
+
+
+def _join(endpoint: str) -> Bus:
+    try:
+        return _close_at_exit(Bus.open(endpoint))
+    except KeyboardInterrupt:  # it comes out when an attempt has failed: that error is none of the reader's
+        raise KeyboardInterrupt from None
 
 
 _open: "WeakSet[Bus]" = WeakSet()

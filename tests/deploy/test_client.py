@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 import brachium
+from brachium.checks import free_port
 from brachium_wire import keys
 from brachium_wire.bus import Bus
 from brachium_wire.codec import encode
@@ -188,3 +189,17 @@ def test_all_promised_names_are_there():
         assert getattr(brachium, name) is not None
     with pytest.raises(AttributeError, match="no attribute 'skeleton'"):
         brachium.skeleton  # noqa: B018 - the lookup is the test
+
+
+def test_ctrl_c_while_no_router_answers_shows_nothing_of_the_transport(tmp_path):
+    code = (
+        "import sys, brachium, logging\nlogging.basicConfig(level=logging.WARNING)\n"
+        f"for _ in brachium.skeletons(endpoint='tcp/127.0.0.1:{free_port()}'): pass"
+    )
+    process = subprocess.Popen([sys.executable, "-c", code], stderr=subprocess.PIPE, text=True)
+    assert process.stderr is not None
+    assert "waiting for the router" in process.stderr.readline()
+    process.send_signal(signal.SIGINT)
+    said = process.communicate(timeout=30)[1]
+    assert "KeyboardInterrupt" in said
+    assert "ZError" not in said

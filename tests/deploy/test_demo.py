@@ -35,6 +35,7 @@ def test_the_network_counts_exactly_what_was_injected(demo):
 
 def test_skeletons_come_calibrated_and_are_compared_with_truth(demo):
     report, _, _ = demo
+    assert report["seconds"] == 12.0  # as asked for
     arm = report["arms"]["p01/right"]
     assert arm["rate_hz"] == pytest.approx(50.0, abs=1.0)
     assert arm["compared"] > 200

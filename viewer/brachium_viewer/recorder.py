@@ -126,6 +126,9 @@ def recover_folder(folder: Path) -> list[recording.RecoverReport]:
             continue
         try:
             report = recording.recover(path)
+        except recording.BeingWritten as error:
+            log.info("%s", error)
+            continue
         except recording.RecordingError as error:
             log.warning("%s", error)
             continue

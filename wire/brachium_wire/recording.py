@@ -21,6 +21,7 @@ from brachium_wire.reading import DAMAGE, MAGIC, PROFILE, Reading, Recorded, Rec
 from brachium_wire.topics import TOPICS
 
 __all__ = [
+    "BeingWritten",
     "Reading",
     "Recorded",
     "RecordingError",
@@ -48,6 +49,10 @@ class RecoverReport:
     """False: the file had been closed and is untouched."""
     warning: str = ""
     """Where the file was cut or damaged."""
+
+
+class BeingWritten(RecordingError):
+    """Another process writes the recording."""
 
 
 def _lock(file: IO[bytes]) -> bool:
@@ -174,7 +179,7 @@ def recover(path: Path) -> RecoverReport:
     """
     with path.open("rb") as held, read(path) as reading:
         if not _lock(held):
-            raise RecordingError(f"{path}: is being written; recover it when the recorder has ended")
+            raise BeingWritten(f"{path}: is being written; recover it when the recorder has ended")
         if is_closed(path):
             counts = Counter(message.key for message in reading)
             return RecoverReport(path=path, messages=dict(counts), recovered=False, warning=reading.warning)

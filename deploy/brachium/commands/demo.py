@@ -4,6 +4,7 @@ brachium demo --seconds 30 --exercise drinking
 """
 
 import argparse
+import importlib.util
 import os
 import secrets
 import sys
@@ -56,6 +57,10 @@ def run(args: argparse.Namespace) -> int:
     folder = args.out or Path("brachium-demo") / datetime.now().strftime("%Y-%m-%dT%H-%M-%S")
     if folder.exists() and any(folder.iterdir()):
         raise Usage(f"{folder} is not empty; give --out a folder that is new")
+    if not args.headless and importlib.util.find_spec("rerun") is None:
+        raise Failed(
+            "the live view needs: pip install 'brachium[view]'; without it: brachium demo --headless"
+        )
     report = _demo(args, folder, begun)
     (folder / "demo.json").write_text(as_json(report) + "\n", encoding="utf-8")
     if args.json:
@@ -127,7 +132,7 @@ def _report(
         exercise=wearer.wearer.exercise,
         level=wearer.wearer.level,
         seed=wearer.wearer.seed,
-        seconds=found.duration_s,
+        seconds=found.duration_s if wearer.seconds is None else min(wearer.seconds, found.duration_s),
         first_skeleton_s=first_s,
         segments=segments,
         arms=arms,

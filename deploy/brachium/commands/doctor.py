@@ -4,6 +4,7 @@ brachium doctor
 """
 
 import argparse
+import logging
 
 from brachium.shell import add_json, print_json
 
@@ -17,6 +18,8 @@ def run(args: argparse.Namespace) -> int:
     """Examine and tell; 1 when something that everything needs is broken."""
     from brachium.checks import examine
 
+    if not args.verbose:
+        logging.getLogger("brachium_router").setLevel(logging.WARNING)  # of the router that is tried
     findings = examine()
     if args.json:
         print_json(findings)
