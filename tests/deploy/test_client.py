@@ -191,7 +191,7 @@ def test_all_promised_names_are_there():
         brachium.skeleton  # noqa: B018 - the lookup is the test
 
 
-def test_ctrl_c_while_no_router_answers_shows_nothing_of_the_transport(tmp_path):
+def test_ctrl_c_while_no_router_answers_shows_nothing_of_the_transport():
     code = (
         "import sys, brachium, logging\nlogging.basicConfig(level=logging.WARNING)\n"
         f"for _ in brachium.skeletons(endpoint='tcp/127.0.0.1:{free_port()}'): pass"

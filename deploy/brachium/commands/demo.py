@@ -58,9 +58,7 @@ def run(args: argparse.Namespace) -> int:
     if folder.exists() and any(folder.iterdir()):
         raise Usage(f"{folder} is not empty; give --out a folder that is new")
     if not args.headless and importlib.util.find_spec("rerun") is None:
-        raise Failed(
-            "the live view needs: pip install 'brachium[view]'; without it: brachium demo --headless"
-        )
+        raise Failed("the live view needs pip install 'brachium[view]'; without it give --headless")
     report = _demo(args, folder, begun)
     (folder / "demo.json").write_text(as_json(report) + "\n", encoding="utf-8")
     if args.json:
