@@ -125,7 +125,7 @@ def test_starts_rates_gaps_and_rows_without_numbers(made, tmp_path) -> None:
     assert np.isnan(columns["forearm_r_qw"][875:888]).all()
     assert np.isnan(columns["elbow_flexion"][875:888]).all()
     assert np.isnan(columns["forearm_r_qw"][:49]).all()
-    assert any("hand_r: 1 rows left out" in w for w in report.warnings)
+    assert any("hand_r: 1 row left out" in w for w in report.warnings)
     truth = np.degrees(flexing(12.0)[:, 3])
     there = np.isfinite(columns["elbow_flexion"]) & (columns["time"] < 108.0)
     assert np.abs(columns["elbow_flexion"] - truth)[there].max() < 3.0

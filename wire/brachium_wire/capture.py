@@ -5,7 +5,7 @@ sensor.
 """
 
 import difflib
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
@@ -13,7 +13,7 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
-from brachium_body.segments import SEGMENTS, Segment
+from brachium_body.segments import SEGMENTS, Segment, side_of
 from brachium_wire import table
 from brachium_wire.capture_checks import check_agreement, check_range
 from brachium_wire.capture_settings import CaptureError, CaptureSettings, read_settings, to_toml
@@ -68,8 +68,9 @@ def load(folder: Path) -> Capture:
     """
     if not folder.is_dir():
         raise CaptureError(f"{folder}: no such folder; a capture is a folder with one file a segment")
-    settings = read_settings(folder / _SETTINGS) if (folder / _SETTINGS).is_file() else CaptureSettings()
     files, truth, warnings = _files(folder)
+    stated = folder / _SETTINGS
+    settings = read_settings(stated) if stated.is_file() else CaptureSettings(side=_side(files))
     segments: dict[Segment, CaptureSegment] = {
         name: _segment(path, settings.rate_hz) for name, path in files.items()
     }
@@ -136,6 +137,12 @@ def _files(folder: Path) -> tuple[dict[Segment, Path], Path | None, list[str]]:
     return segments, found.get(_TRUTH), aside
 
 
+def _side(segments: Iterable[str]) -> Literal["right", "left", "both"]:
+    """Return the side of the arms that the tables are of."""
+    found = {side_of(name) for name in segments} - {None}
+    return "both" if len(found) == 2 else "left" if found == {"left"} else "right"
+
+
 def _segment(path: Path, nominal_hz: float | None) -> CaptureSegment:
     try:
         columns = table.read(path).columns
@@ -152,7 +159,7 @@ def _segment(path: Path, nominal_hz: float | None) -> CaptureSegment:
         raise CaptureError(f"{path}: ax ay az and gx gy gz belong together; one of them is missing")
     t = _numbers(path, columns, "t")
     check_range(path, t)
-    whole = np.ones(len(t), dtype=np.bool_)
+    whole = np.isfinite(t)
     for name in ("acc", "gyr", "quat"):
         if (block := blocks[name]) is not None:
             whole &= np.isfinite(block).all(axis=1)
