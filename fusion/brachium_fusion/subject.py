@@ -137,7 +137,10 @@ class Subject:
         if track is not None and track.info == info:
             return
         if track is not None:
-            self._lose(segment, mounting=track.info.node != info.node)
+            worn = info.origin == "worn"
+            self._lose(segment, mounting=not worn or track.info.node != info.node)
+            if not worn and self.alignment is not None and not self.alignment.mounting:
+                self._begin_anew()
         self.tracks[segment] = SegmentTrack(info, self._settings.filter, self._settings.magnetometer)
         self._held.pop(segment, None)
         self.revision += 1

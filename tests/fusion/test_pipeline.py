@@ -799,3 +799,15 @@ def test_a_second_run_of_the_same_sensors_goes_on_and_who_is_not_worn_stands_in_
     qualities = {s.segments["forearm_r"].quality for s in second}
     assert ("uncalibrated" in qualities) == (origin == "emulated")
     assert second[-1].segments["forearm_r"].quality in ("good", "heading_assumed")
+
+
+def test_another_emulated_wearer_under_the_same_names_is_calibrated_anew(made) -> None:
+    quats, _, _ = worn(made, seconds=6.0)
+    messages = made.orientation_messages(quats)
+    pipeline = fed([*made.info_messages(quats), *messages])
+    assert published(pipeline)[-1].segments["forearm_r"].quality in ("good", "heading_assumed")
+    other = made.info_messages(quats, firmware="another")
+    second = published(fed([*other, *later(messages, 60_000_000_000)], pipeline=pipeline))
+    begun = {s.segments["forearm_r"].quality for s in second[:100] if "forearm_r" in s.segments}
+    assert begun == {"uncalibrated"}
+    assert second[-1].segments["forearm_r"].quality in ("good", "heading_assumed")
