@@ -1,7 +1,71 @@
-"""What all tests share."""
+"""What all tests share: how Hypothesis judges, and a router of the product's own settings."""
 
+import socket
+import subprocess
+import sys
+from collections.abc import Iterator
+
+import pytest
 from hypothesis import HealthCheck, settings
+
+from brachium_router import config
 
 # Tests judge counts and orderings, never time: a busy machine must not fail them.
 settings.register_profile("any-machine", deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("any-machine")
+
+ENDED_WITHIN_S = 15.0
+
+_ROUTER = """
+import sys, zenoh
+with zenoh.open(zenoh.Config.from_json5(sys.argv[1])):
+    print("ready", flush=True)
+    sys.stdin.read()
+"""
+
+
+class RouterProcess:
+    """A router on loopback in a process of its own; it can be started again at the same endpoint.
+
+    It runs with the settings of `brachium router`: those of Zenoh alone queue an eighth as much for a
+    reader, and a reader that a busy machine holds up would lose what it loses in no room.
+    """
+
+    def __init__(self) -> None:
+        with socket.socket() as probe:
+            probe.bind(("127.0.0.1", 0))
+            chosen = config.RouterSettings(port=probe.getsockname()[1])
+        self.endpoint = config.endpoint(chosen)
+        self._command = [sys.executable, "-c", _ROUTER, config.router_json5(chosen)]
+        self._process: subprocess.Popen[bytes] | None = None
+
+    def start(self) -> None:
+        self._process = subprocess.Popen(self._command, stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+        assert self._process.stdout is not None
+        assert self._process.stdout.readline() == b"ready\n"
+
+    def stop(self) -> None:
+        if self._process is not None:
+            self._process.kill()
+            self._process.communicate(timeout=ENDED_WITHIN_S)
+            self._process = None
+
+
+def _running() -> Iterator[RouterProcess]:
+    process = RouterProcess()
+    process.start()
+    yield process
+    process.stop()
+
+
+@pytest.fixture
+def router() -> Iterator[RouterProcess]:
+    """A router for one test, which may stop it and start it again."""
+    yield from _running()
+
+
+@pytest.fixture(scope="module")
+def endpoint() -> Iterator[str]:
+    """Where a router listens that the tests of one file share."""
+    for process in _running():
+        yield process.endpoint

@@ -1,9 +1,5 @@
 """The fusion service on a real router: samples in, skeletons out, commands answered."""
 
-import json
-import socket
-import subprocess
-import sys
 import threading
 import time
 from collections.abc import Iterator
@@ -25,35 +21,10 @@ from brachium_wire.messages import Answer, Calibration, Command, Event, Health, 
 
 pytestmark = pytest.mark.network
 
-ROOM, SUBJECT, DEADLINE_S = "room", "p01", 20.0
-
-ROUTER = """
-import json, sys, zenoh
-with zenoh.open(zenoh.Config.from_json5(sys.argv[1])):
-    print("ready", flush=True)
-    sys.stdin.read()
-"""
-
-
-@pytest.fixture(scope="module")
-def endpoint() -> Iterator[str]:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        where = f"tcp/127.0.0.1:{probe.getsockname()[1]}"
-    config = {
-        "mode": "router",
-        "listen": {"endpoints": [where]},
-        "scouting": {"multicast": {"enabled": False}, "gossip": {"enabled": False}, "delay": 0},
-        "transport": {"shared_memory": {"enabled": False}},
-    }
-    command = [sys.executable, "-c", ROUTER, json.dumps(config)]
-    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as process:
-        assert process.stdout is not None
-        assert process.stdout.readline() == b"ready\n"
-        yield where
-        assert process.stdin is not None
-        process.stdin.close()
-        process.wait(timeout=5)
+SUBJECT, DEADLINE_S = "p01", 20.0
+PIECE = 24
+"""Messages put at once: a room spreads over seconds what a test has at hand at once, and a stream on the bus
+drops what finds its queue full."""
 
 
 @pytest.fixture
@@ -68,12 +39,16 @@ class Fusion:
     def __init__(self, endpoint: str, bus: Bus, room: str, **chosen) -> None:
         self.stop = threading.Event()
         self.error: BaseException | None = None
+        self._bus, self._room = bus, room
         self._inbox = bus.subscribe(keys.everything(room))
         self.skeletons: list[Skeleton] = []
         self.calibrations: list[Calibration] = []
         self.events: list[Event] = []
         self.health = Health(kind="", id="", time_ns=0, uptime_s=0.0)
         settings = FuseSettings(endpoint=endpoint, room=room, pipeline=Settings(**chosen))
+        self._pipeline = Pipeline(settings.pipeline)
+        """It is given what the service is given, and so knows how many skeletons are due."""
+        self._due = 0
         self._thread = threading.Thread(target=self._run, args=(settings,))
         self._thread.start()
         self.until(lambda: self.health.kind == "fusion", "the first health")
@@ -83,6 +58,23 @@ class Fusion:
             run(settings, self.stop)
         except BaseException as error:  # told by `until` and `end`
             self.error = error
+
+    def put(self, messages) -> None:
+        """Put messages of sensors, each piece once all skeletons of the piece before were heard."""
+        for first in range(0, len(messages), PIECE):
+            piece = messages[first : first + PIECE]
+            for key, payload in piece:
+                if key.topic == "info":
+                    self._bus.retain(keys.info(self._room, SUBJECT, key.detail), payload)
+                else:
+                    self._bus.put(keys.imu(self._room, SUBJECT, key.detail), payload)
+            self.expect(piece)
+            self.until(lambda: len(self.skeletons) >= self._due, "the skeletons of a piece")
+
+    def expect(self, messages) -> None:
+        """Count the skeletons due of messages that the service has or gets."""
+        self._pipeline.feed_all(messages)
+        self._due += len(self._pipeline.skeletons())
 
     def listen(self) -> None:
         for key, payload in self._inbox.drain():
@@ -138,26 +130,14 @@ def hanging(made, seconds: float, bend: float = 0.0):
     return quats | {"forearm_r": forearm, "hand_r": forearm}
 
 
-def retain_info(bus: Bus, room: str, made, segments) -> None:
-    for key, payload in made.info_messages(segments):
-        bus.retain(keys.info(room, SUBJECT, key.detail), payload)
-
-
-def put(bus: Bus, room: str, messages) -> None:
-    for key, payload in messages:
-        bus.put(keys.imu(room, SUBJECT, key.detail), payload)
-
-
-def test_samples_become_skeletons_and_every_count_is_told(made, fusion, bus) -> None:
+def test_samples_become_skeletons_and_every_count_is_told(made, fusion) -> None:
     service = fusion("plain")
     quats = hanging(made, 4.0)
     messages = made.orientation_messages(quats)
-    retain_info(bus, "plain", made, quats)
-    put(bus, "plain", messages)
+    service.put(made.info_messages(quats) + messages)
     wanted = Pipeline()
     wanted.feed_all(made.info_messages(quats) + messages)
     expected = [solved.skeleton for solved in wanted.skeletons()]
-    service.until(lambda: len(service.skeletons) >= len(expected), "all skeletons")
     assert service.skeletons == expected
     service.until(lambda: service.health.counts.get("skeletons") == len(expected), "the count in health")
     assert service.health.counts["subjects"] == 1
@@ -166,11 +146,10 @@ def test_samples_become_skeletons_and_every_count_is_told(made, fusion, bus) -> 
     assert [c.state for c in service.calibrations] == ["done"]
 
 
-def test_fusion_tells_each_subjects_recording_how_it_solves(made, fusion, bus) -> None:
+def test_fusion_tells_each_subjects_recording_how_it_solves(made, fusion) -> None:
     service = fusion("told", filter="complementary", magnetometer=False, rate_hz=25.0)
     quats = hanging(made, 0.5)
-    retain_info(bus, "told", made, quats)
-    put(bus, "told", made.orientation_messages(quats))
+    service.put(made.info_messages(quats) + made.orientation_messages(quats))
     service.until(lambda: any(e.kind == "settings" for e in service.events), "the settings")
     told = [Settings(**e.data) for e in service.events if e.kind == "settings"]
     assert told == [Settings(filter="complementary", magnetometer=False, rate_hz=25.0)]
@@ -180,15 +159,14 @@ def test_bad_bytes_and_sessions_are_counted_and_the_service_goes_on(made, fusion
     service = fusion("bad")
     quats = hanging(made, 1.0)
     messages = made.orientation_messages(quats)
-    retain_info(bus, "bad", made, quats)
-    put(bus, "bad", messages[:10])
+    service.put(made.info_messages(quats) + messages[:10])
     for _ in range(3):
         bus.put(keys.imu("bad", SUBJECT, "hand_r"), b"\xc1")
     bus.put(keys.imu("bad", SUBJECT, "tail"), messages[0][1])
     bus.put(keys.session("bad", SUBJECT), encode(Session(lengths_m={"upper_arm": 2.9})))
     bus.put(keys.session("bad", SUBJECT), b"\x80")
-    put(bus, "bad", messages[10:])
-    service.until(lambda: len(service.skeletons) >= 48, "skeletons")
+    service.put(messages[10:])
+    assert len(service.skeletons) >= 48
     service.until(lambda: sum(service.health.drops.values()) >= 10, "the drops in health")
     assert service.health.drops == {
         "malformed": 3,
@@ -227,20 +205,18 @@ def test_calibrate_is_answered_when_it_is_done_and_a_wrong_wish_at_once(made, fu
     assert "no sensor of subject" in ask(bus, "cal", "calibrate", {}).wait().reason
     quats = hanging(made, 4.0)
     messages = made.orientation_messages(quats)
-    retain_info(bus, "cal", made, quats)
-    put(bus, "cal", messages[:30])
-    service.until(lambda: service.skeletons, "the first skeleton")
+    service.put(made.info_messages(quats) + messages[:30])
     refused = ask(bus, "cal", "calibrate", {"pose": "headstand"}).wait()
     assert not refused.ok
     assert "poses are n-pose" in refused.reason
     asked = ask(bus, "cal", "calibrate", {"seconds": 2})
     service.until(lambda: any(e.text == "calibrate" for e in service.events), "the command applied")
-    put(bus, "cal", messages[30:])
+    service.put(messages[30:])
     answer = asked.wait()
     assert answer.ok
     assert "sway_deg_forearm_r" in answer.data["scores"]
     service.until(lambda: [c.state for c in service.calibrations] == ["waiting", "done"], "both states")
-    (retained,) = bus.fetch(keys.calibration("cal", SUBJECT))
+    (retained,) = bus.fetch(keys.calibration("cal", SUBJECT), timeout_s=DEADLINE_S)
     assert decode_topic(retained[1], "calibration") == service.calibrations[-1]
 
 
@@ -251,12 +227,10 @@ def test_calibrate_is_refused_with_the_name_of_who_moved(made, fusion, bus) -> N
     wave = rotation.about(0, 0.5 * np.sin(np.arange(n) / 30.0))
     quats["hand_r"] = rotation.multiply(quats["hand_r"], wave)
     messages = made.orientation_messages(quats, batch=50)
-    retain_info(bus, "move", made, quats)
-    put(bus, "move", messages[:6])
-    service.until(lambda: service.skeletons, "the first skeleton")
+    service.put(made.info_messages(quats) + messages[:6])
     asked = ask(bus, "move", "calibrate", {"seconds": 2})
     service.until(lambda: any(e.text == "calibrate" for e in service.events), "the command applied")
-    put(bus, "move", messages[6:])
+    service.put(messages[6:])
     answer = asked.wait()
     assert not answer.ok
     assert "hand_r was not still" in answer.reason
@@ -265,9 +239,7 @@ def test_calibrate_is_refused_with_the_name_of_who_moved(made, fusion, bus) -> N
 def test_who_waits_for_a_calibration_is_told_when_fusion_stops(made, fusion, bus) -> None:
     service = fusion("wait", auto_pose=False)
     quats = hanging(made, 1.0)
-    retain_info(bus, "wait", made, quats)
-    put(bus, "wait", made.orientation_messages(quats))
-    service.until(lambda: service.skeletons, "the first skeleton")
+    service.put(made.info_messages(quats) + made.orientation_messages(quats))
     asked = ask(bus, "wait", "calibrate", {})
     service.until(lambda: any(e.text == "calibrate" for e in service.events), "the command applied")
     assert service.end() < 2.0
@@ -278,30 +250,32 @@ def test_record_answers_a_snapshot_from_which_fusion_goes_on(made, fusion, bus) 
     service = fusion("rec")
     quats = hanging(made, 6.0, bend=1.0)
     messages = made.orientation_messages(quats)
-    retain_info(bus, "rec", made, quats)
-    put(bus, "rec", messages[:200])
-    service.until(lambda: len(service.skeletons) >= 160, "skeletons of the first part")
+    # Whole rounds of all sensors: the last message gives a skeleton, so nothing can come after the question.
+    first = 66 * len(quats)
+    service.put(made.info_messages(quats) + messages[:first])
+    known = len(service.skeletons)
+    assert known >= 160
     answer = ask(bus, "rec", "record", {}).wait()
     assert answer.ok
-    service.listen()
-    known = len(service.skeletons)
     pipeline = Pipeline()
     pipeline.restore(SUBJECT, decode(answer.data["snapshot"], Snapshot))
-    put(bus, "rec", messages[200:])
-    pipeline.feed_all(messages[200:])
+    service.put(messages[first:])
+    pipeline.feed_all(messages[first:])
     again = [solved.skeleton for solved in pipeline.skeletons()]
     assert len(again) > 100
-    service.until(lambda: len(service.skeletons) >= known + len(again), "the second part")
     assert service.skeletons[known:] == again
 
 
 def test_fusion_that_starts_late_learns_what_is_retained(made, fusion, bus) -> None:
     quats = hanging(made, 1.0)
-    retain_info(bus, "late", made, quats)
+    infos = made.info_messages(quats)
+    for key, payload in infos:
+        bus.retain(keys.info("late", SUBJECT, key.detail), payload)
     bus.retain(keys.session("late", SUBJECT), encode(Session(height_m=1.5)))
     service = fusion("late")
-    put(bus, "late", made.orientation_messages(quats))
-    service.until(lambda: len(service.skeletons) >= 48, "skeletons")
+    service.expect(infos)
+    service.put(made.orientation_messages(quats))
+    assert len(service.skeletons) >= 48
     assert service.skeletons[0].positions["shoulder"][0] == pytest.approx(0.129 * 1.5)
     applied = [e for e in service.events if e.kind == "applied"]
     assert [e.text for e in applied] == ["session"]

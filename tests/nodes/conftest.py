@@ -1,7 +1,4 @@
-import json
 import socket
-import subprocess
-import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -18,13 +15,6 @@ from brachium_wire.messages import Health, Status
 DEADLINE_S = 15.0
 ROOM = "test"
 
-ROUTER = """
-import json, sys, zenoh
-with zenoh.open(zenoh.Config.from_json5(sys.argv[1])):
-    print("ready", flush=True)
-    sys.stdin.read()
-"""
-
 
 def until(condition: Callable[[], object], what: str) -> None:
     deadline = time.monotonic() + DEADLINE_S
@@ -38,25 +28,6 @@ def unused_port() -> int:
     with socket.socket() as s:
         s.bind(("127.0.0.1", 0))
         return int(s.getsockname()[1])
-
-
-@pytest.fixture(scope="session")
-def endpoint() -> Iterator[str]:
-    where = f"tcp/127.0.0.1:{unused_port()}"
-    config = {
-        "mode": "router",
-        "listen": {"endpoints": [where]},
-        "scouting": {"multicast": {"enabled": False}, "gossip": {"enabled": False}, "delay": 0},
-        "transport": {"shared_memory": {"enabled": False}},
-    }
-    command = [sys.executable, "-c", ROUTER, json.dumps(config)]
-    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as process:
-        assert process.stdout is not None
-        assert process.stdout.readline() == b"ready\n"
-        yield where
-        assert process.stdin is not None
-        process.stdin.close()
-        process.wait(timeout=5)
 
 
 @pytest.fixture
