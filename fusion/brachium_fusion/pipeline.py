@@ -17,8 +17,9 @@ import msgpack
 import msgspec
 
 from brachium_fusion.arms import Arms
+from brachium_fusion.pose_watch import checked_wish
 from brachium_fusion.rows import Row, check_session, rows_of
-from brachium_fusion.subject import Change, Settings, Subject, checked_wish
+from brachium_fusion.subject import Change, Settings, Subject
 from brachium_wire import keys
 from brachium_wire.codec import WireError, decode_batch, decode_topic, encode
 from brachium_wire.messages import Calibration, Info, SampleBatch, Session, Skeleton, Snapshot

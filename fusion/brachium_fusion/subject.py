@@ -6,7 +6,7 @@ changes stamped with the instant from which they hold. So a recording of them gi
 
 from collections import Counter, deque
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, replace
 from typing import Any, NamedTuple
 
 import msgspec
@@ -15,7 +15,8 @@ import numpy.typing as npt
 
 from brachium_body.segments import SEGMENTS, Side
 from brachium_fusion.orientation import FilterName
-from brachium_fusion.pose import POSES, Alignment, PoseName, PoseSensor, align, pose_orientations
+from brachium_fusion.pose import Alignment, PoseName, PoseSensor, align, pose_orientations
+from brachium_fusion.pose_watch import HeldPose, PoseWatch, PoseWish
 from brachium_fusion.track import Reading, SegmentTrack
 from brachium_wire.codec import Drop
 from brachium_wire.messages import Calibration, Info, Session
@@ -27,12 +28,6 @@ HELD_NS = 150_000_000
 """A segment this far behind the newest arrival, beyond its own batches, no longer holds the others up."""
 MISSING_NS = 500_000_000
 """A segment this far behind is missing: its last orientation says nothing any more."""
-STILL_S = 3.0
-"""A pose counts once all sensors were still for this long."""
-POSE_USED_NS = 2_000_000_000
-"""Of the pose, the last two seconds are used: the filters have settled by then."""
-POSE_PATIENCE_S = 30.0
-"""A pose that was asked for is refused when nobody stood still for this long."""
 HOST_GONE_NS = 2_000_000_000
 """Another host may take a subject over once the first was silent for this long."""
 WAITING_BATCHES = 64
@@ -65,18 +60,6 @@ class Change(NamedTuple):
     data: dict[str, Any]
 
 
-@dataclass(slots=True)
-class _Pose:
-    """A pose that is waited for."""
-
-    pose: PoseName = "n-pose"
-    seconds: float = STILL_S
-    angles_deg: dict[str, float] = field(default_factory=dict)
-    from_ns: int = 0
-    patient: bool = True
-    """It is never refused."""
-
-
 class Instant(NamedTuple):
     """What is known of every segment at one tick."""
 
@@ -105,8 +88,7 @@ class Subject:
         self._done_ns = 0
         self._begun_ns = 0
         self._host: str | None = None
-        self._pose: _Pose | None = _Pose() if settings.auto_pose else None
-        self._held: dict[str, list[tuple[int, Floats]]] = {}
+        self._watch: PoseWatch | None = PoseWatch(PoseWish()) if settings.auto_pose else None
         self.tracks: dict[str, SegmentTrack] = {}
         self.received_ns = 0
         self.alignment: Alignment | None = None
@@ -142,7 +124,8 @@ class Subject:
             if not worn and self.alignment is not None and not self.alignment.mounting:
                 self._begin_anew()
         self.tracks[segment] = SegmentTrack(info, self._settings.filter, self._settings.magnetometer)
-        self._held.pop(segment, None)
+        if self._watch is not None:
+            self._watch.forget(segment)
         self.revision += 1
         for samples in self._unclaimed.pop(segment, ()):
             self.feed(segment, samples)
@@ -164,8 +147,8 @@ class Subject:
         if self.alignment is None:
             return
         self.alignment = None
-        self._pose = _Pose(from_ns=self.next_tick_ns()) if self._settings.auto_pose else None
-        self._held.clear()
+        wish = PoseWish(from_ns=self.next_tick_ns())
+        self._watch = PoseWatch(wish) if self._settings.auto_pose else None
         self.revision += 1
         self._say(
             self.next_tick_ns(), "waiting", reason="another run of these sensors: stand still in the pose"
@@ -313,42 +296,21 @@ class Subject:
                 self.session = msgspec.convert(change.data, Session)
                 self.revision += 1
             else:
-                self._pose = _Pose(from_ns=now, patient=False, **change.data)
-                self._held.clear()
+                self._watch = PoseWatch(PoseWish(from_ns=now, patient=False, **change.data))
                 self._say(now, "waiting", reason="stand still in the pose")
 
     def _watch_pose(self, now: int, readings: dict[str, Reading | None]) -> None:
-        pose = self._pose
-        if pose is None:
+        if self._watch is None:
             return
         live = {s: r for s, r in readings.items() if r is not None and r.quality in ("good", "disturbed")}
-        start = max((self.tracks[s].still_since_ns for s in live), default=now + 1)
-        start = max(start, pose.from_ns)
-        if start > now:
-            self._held.clear()
+        seen = self._watch.see(now, live, {s: self.tracks[s].still_since_ns for s in live})
+        if seen is None:
+            return
+        pose, self._watch = self._watch.wish.pose, None
+        if isinstance(seen, HeldPose):
+            self.take_alignment(now, seen.world_from_sensor, pose, seen.angles_deg)
         else:
-            for segment, reading in live.items():
-                # Still: the sample next to the instant is as good as one in between, and costs nothing.
-                self._held.setdefault(segment, []).append((now, reading.after))
-            if now - start >= pose.seconds * 1e9:
-                self._take_pose(now, pose)
-                return
-        if not pose.patient and now - pose.from_ns > (POSE_PATIENCE_S + pose.seconds) * 1e9:
-            moving = max(live, key=lambda s: self.tracks[s].still_since_ns, default="no sensor")
-            self._pose = None
-            self._say(
-                now,
-                "refused",
-                pose=pose.pose,
-                reason=f"{moving} was not still for {pose.seconds:g} s within {POSE_PATIENCE_S:g} s; "
-                "stand still (slower than 0.15 rad/s) and ask again",
-            )
-
-    def _take_pose(self, now: int, pose: _Pose) -> None:
-        used = {s: [q for t, q in held if t >= now - POSE_USED_NS] for s, held in self._held.items()}
-        self._pose = None
-        self._held.clear()
-        self.take_alignment(now, {s: np.array(q) for s, q in used.items() if q}, pose.pose, pose.angles_deg)
+            self._say(now, "refused", pose=pose, reason=seen)
 
     def take_alignment(
         self,
@@ -405,8 +367,7 @@ class Subject:
             "unclaimed": {s: [_plain(b) for b in batches] for s, batches in self._unclaimed.items()},
             "host": self._host,
             "pending": [[c.from_ns, c.kind, c.data] for c in self._pending],
-            "pose": None if self._pose is None else msgspec.to_builtins(self._pose),
-            "held": {s: [[t, q.tolist()] for t, q in rows] for s, rows in self._held.items()},
+            "watch": None if self._watch is None else self._watch.state(),
             "tracks": {s: [msgspec.to_builtins(t.info), t.state()] for s, t in self.tracks.items()},
             "received_ns": self.received_ns,
             "alignment": None if self.alignment is None else self.alignment.state(),
@@ -424,8 +385,7 @@ class Subject:
             for s, batches in state["unclaimed"].items()
         }
         self._pending = [Change(*c) for c in state["pending"]]
-        self._pose = None if state["pose"] is None else _Pose(**state["pose"])
-        self._held = {s: [(t, np.array(q)) for t, q in rows] for s, rows in state["held"].items()}
+        self._watch = None if state["watch"] is None else PoseWatch.from_state(state["watch"])
         self.tracks = {}
         for segment, (info, track_state) in state["tracks"].items():
             track = SegmentTrack(
@@ -438,23 +398,6 @@ class Subject:
         self.reference_ns = state["reference_ns"]
         self.session = msgspec.convert(state["session"], Session)
         self.revision += 1
-
-
-def checked_wish(arguments: dict[str, Any]) -> dict[str, Any]:
-    """Return the arguments of `calibrate`, complete, or raise ValueError saying what may be asked."""
-    wish = {"pose": "n-pose", "seconds": STILL_S, "angles_deg": {}} | arguments
-    pose, seconds, angles = wish["pose"], wish["seconds"], wish["angles_deg"]
-    if len(wish) > 3:
-        unknown = sorted(set(wish) - {"pose", "seconds", "angles_deg"})[0]
-        raise ValueError(f"calibrate does not know {unknown!r}; it takes pose, seconds, angles_deg")
-    if pose not in POSES:
-        raise ValueError(f"calibrate: pose {pose!r} is not known; poses are {', '.join(POSES)}")
-    if not isinstance(seconds, int | float) or not 1.0 <= seconds <= 30.0:
-        raise ValueError(f"calibrate: seconds must be 1 to 30, not {seconds!r}")
-    if not isinstance(angles, dict) or not all(isinstance(v, int | float) for v in angles.values()):
-        raise ValueError("calibrate: angles_deg must be a map from an angle's name to degrees")
-    pose_orientations(pose, angles)
-    return {"pose": pose, "seconds": float(seconds), "angles_deg": angles}
 
 
 _BLOCKS = ("acc", "gyr", "mag", "quat")

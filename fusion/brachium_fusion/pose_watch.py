@@ -1,0 +1,111 @@
+"""Waiting for a pose: all sensors still for long enough, or a reason why nobody stood still. Pure."""
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from brachium_fusion.pose import POSES, PoseName, pose_orientations
+from brachium_fusion.track import Reading
+
+Floats = npt.NDArray[np.float64]
+
+STILL_S = 3.0
+"""A pose counts once all sensors were still for this long."""
+POSE_USED_NS = 2_000_000_000
+"""Of the pose, the last two seconds are used: the filters have settled by then."""
+POSE_PATIENCE_S = 30.0
+"""A pose that was asked for is refused when nobody stood still for this long."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PoseWish:
+    """A pose that is waited for."""
+
+    pose: PoseName = "n-pose"
+    seconds: float = STILL_S
+    angles_deg: dict[str, float] = field(default_factory=dict)
+    from_ns: int = 0
+    patient: bool = True
+    """It is never refused."""
+
+
+class HeldPose(NamedTuple):
+    """A pose that was held."""
+
+    pose: PoseName
+    angles_deg: dict[str, float]
+    world_from_sensor: dict[str, Floats]
+    """Per segment (k, 4), while it was held."""
+
+
+class PoseWatch:
+    """Collects orientations as long as all sensors are still."""
+
+    def __init__(self, wish: PoseWish) -> None:
+        self.wish = wish
+        self._held: dict[str, list[tuple[int, Floats]]] = {}
+
+    def forget(self, segment: str) -> None:
+        """Leave aside what a sensor showed that is not there any more."""
+        self._held.pop(segment, None)
+
+    def see(
+        self, now: int, live: Mapping[str, Reading], still_since: Mapping[str, int]
+    ) -> HeldPose | str | None:
+        """Take the sensors that are there at an instant, and since when each is still, host time ns.
+
+        Return the pose once it was held, or why it was refused; None while it is waited for.
+        """
+        wish = self.wish
+        start = max((still_since[s] for s in live), default=now + 1)
+        start = max(start, wish.from_ns)
+        if start > now:
+            self._held.clear()
+        else:
+            for segment, reading in live.items():
+                # Still: the sample next to the instant is as good as one in between, and costs nothing.
+                self._held.setdefault(segment, []).append((now, reading.after))
+            if now - start >= wish.seconds * 1e9:
+                used = {s: [q for t, q in held if t >= now - POSE_USED_NS] for s, held in self._held.items()}
+                return HeldPose(wish.pose, wish.angles_deg, {s: np.array(q) for s, q in used.items() if q})
+        if not wish.patient and now - wish.from_ns > (POSE_PATIENCE_S + wish.seconds) * 1e9:
+            moving = max(live, key=lambda s: still_since[s], default="no sensor")
+            return (
+                f"{moving} was not still for {wish.seconds:g} s within {POSE_PATIENCE_S:g} s; "
+                "stand still (slower than 0.15 rad/s) and ask again"
+            )
+        return None
+
+    def state(self) -> dict[str, Any]:
+        """Return all that changes, as plain values."""
+        return {
+            "wish": asdict(self.wish),
+            "held": {s: [[t, q.tolist()] for t, q in rows] for s, rows in self._held.items()},
+        }
+
+    @staticmethod
+    def from_state(state: dict[str, Any]) -> "PoseWatch":
+        """Return the watch whose state this is."""
+        watch = PoseWatch(PoseWish(**state["wish"]))
+        watch._held = {s: [(t, np.array(q)) for t, q in rows] for s, rows in state["held"].items()}
+        return watch
+
+
+def checked_wish(arguments: dict[str, Any]) -> dict[str, Any]:
+    """Return the arguments of `calibrate`, complete, or raise ValueError saying what may be asked."""
+    wish = {"pose": "n-pose", "seconds": STILL_S, "angles_deg": {}} | arguments
+    pose, seconds, angles = wish["pose"], wish["seconds"], wish["angles_deg"]
+    if len(wish) > 3:
+        unknown = sorted(set(wish) - {"pose", "seconds", "angles_deg"})[0]
+        raise ValueError(f"calibrate does not know {unknown!r}; it takes pose, seconds, angles_deg")
+    if pose not in POSES:
+        raise ValueError(f"calibrate: pose {pose!r} is not known; poses are {', '.join(POSES)}")
+    if not isinstance(seconds, int | float) or not 1.0 <= seconds <= 30.0:
+        raise ValueError(f"calibrate: seconds must be 1 to 30, not {seconds!r}")
+    if not isinstance(angles, dict) or not all(isinstance(v, int | float) for v in angles.values()):
+        raise ValueError("calibrate: angles_deg must be a map from an angle's name to degrees")
+    pose_orientations(pose, angles)
+    return {"pose": pose, "seconds": float(seconds), "angles_deg": angles}
