@@ -1,25 +1,22 @@
 """Error statistics between two results, or a result and a reference: b is the reference, errors are a - b."""
 
-from collections.abc import Callable
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
-import numpy.typing as npt
 
-from brachium_body.rotation import inverse, multiply
-from brachium_viewer import alignment as al
-from brachium_viewer.statistics import ErrorFigures, error_figures, orientation_errors_deg
+from brachium_viewer import agreement_chart
+from brachium_viewer.agreement import Agreement, agreement
+from brachium_viewer.one_frame import FRAMES, FrameName, Removed
+from brachium_viewer.pairing import Floats, Mask, Matched, OrientationFigures, Pair
+from brachium_viewer.repetitions import Repetition, repetitions
+from brachium_viewer.statistics import ErrorFigures, error_figures
 from brachium_wire import table
 from brachium_wire.capture_settings import read_settings
 from brachium_wire.table import Table, TableError
 
-Floats = npt.NDArray[np.float64]
-Mask = npt.NDArray[np.bool_]
-
-ROUNDING_DEG = 1e-9
-"""Smaller angles are what float64 leaves over; people are shown 0."""
+AUTO, NONE = "auto", "none"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -28,8 +25,12 @@ class CompareSettings:
 
     lag: float | Literal["estimate"] = 0.0
     """Seconds by which a is late: its row at t + lag belongs to b's at t. `estimate`: the best whole number
-    of b's samples within `max_lag_samples`."""
-    max_lag_samples: int = 2
+    of b's samples within `max_lag_samples`, or within half a second."""
+    max_lag_samples: int | None = None
+    frame: FrameName = "none"
+    """What of a's frame is turned and shifted onto b's first: nothing, everything, or only the heading."""
+    repetitions: str = AUTO
+    """The column of b that rises once a repetition; `auto`: the angle that moves most; `none`: no cutting."""
     mask: str = ""
     """A column of b, true where rows count."""
     from_s: float | None = None
@@ -38,12 +39,25 @@ class CompareSettings:
 
 
 @dataclass(frozen=True, kw_only=True)
-class OrientationFigures:
-    """Errors of one orientation, deg: the whole angle, and its parts about the vertical and from it."""
+class Aligned:
+    """What aligning in time and frame took out of the errors: the mean RMSE before and after, by unit."""
 
-    total: ErrorFigures
-    heading: ErrorFigures
-    inclination: ErrorFigures
+    lag_s: float
+    frame: Removed | None
+    before: dict[str, float]
+    after: dict[str, float]
+
+
+@dataclass(frozen=True, kw_only=True)
+class PerRepetition:
+    """One number, repetition by repetition."""
+
+    rmse: ErrorFigures
+    """Of the repetitions' own RMSE: bias is their mean, sd their spread."""
+    highest: Agreement
+    """Of the highest value in each repetition."""
+    reach: Agreement
+    """Of highest less lowest: the range of motion."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -56,11 +70,19 @@ class Comparison:
     """Rows of b that count."""
     lag_s: float
     mask: str = ""
+    aligned: Aligned | None = None
+    """None when neither a lag nor a frame was asked for."""
     columns: dict[str, ErrorFigures] = field(default_factory=dict)
     units: dict[str, str] = field(default_factory=dict)
     orientations: dict[str, OrientationFigures] = field(default_factory=dict)
     relative: dict[str, ErrorFigures] = field(default_factory=dict)
     """Of one orientation as seen from another, by `forearm_r_sensor from upper_arm_r_sensor`, deg."""
+    agreement: dict[str, Agreement] = field(default_factory=dict)
+    """Of every common number, row by row."""
+    repetitions_of: str = ""
+    """The column that cut them; empty when there are fewer than three."""
+    repetitions: list[Repetition] = field(default_factory=list)
+    per_repetition: dict[str, PerRepetition] = field(default_factory=dict)
 
     def to_json(self) -> dict[str, Any]:
         """Return the same as maps, text and numbers."""
@@ -78,129 +100,129 @@ def settings_beside(reference: Path) -> CompareSettings:
     return CompareSettings(mask=truth.mask)
 
 
-def compare(a: Path, b: Path, settings: CompareSettings | None = None) -> Comparison:
+def compare(
+    a: Path, b: Path, settings: CompareSettings | None = None, figure: Path | None = None
+) -> Comparison:
     """Compare two result files, CSV or Parquet; without settings as `settings_beside(b)` says.
 
-    Raises table.TableError (or a capture error) when a file is no table or nothing in them can be compared.
+    `figure` is where Bland-Altman plots are drawn, by its ending. Raises table.TableError (or a capture
+    error) when a file is no table or nothing in them can be compared.
     """
     chosen = settings_beside(b) if settings is None else settings
-    return compare_tables(table.read(a), table.read(b), chosen, names=(str(a), str(b)))
+    found, rows = matched(table.read(a), table.read(b), chosen, names=(str(a), str(b)))
+    if figure is not None:
+        agreement_chart.draw(figure, rows.numbers, rows.counts, found.units)
+    return found
 
 
 def compare_tables(
     a: Table, b: Table, settings: CompareSettings, names: tuple[str, str] = ("a", "b")
 ) -> Comparison:
     """Compare two tables: every common column of numbers, and every common orientation."""
+    return matched(a, b, settings, names)[0]
+
+
+def matched(
+    a: Table, b: Table, settings: CompareSettings, names: tuple[str, str] = ("a", "b")
+) -> tuple[Comparison, Matched]:
+    """Return the comparison and the rows it rests on."""
     if settings.lag != "estimate" and not np.isfinite(settings.lag):
         raise TableError(f"lag = {settings.lag}: expected seconds, a finite number, or the word estimate")
-    both = _Pair(a, b, settings, names)
-    if not both.stems and not both.numbers:
-        raise TableError(f"{names[0]} and {names[1]} have no column in common that could be compared")
-    lag_s = settings.lag
-    if lag_s == "estimate":
-        period = float(np.median(np.diff(both.b_time)))
-        lags = sorted(range(-settings.max_lag_samples, settings.max_lag_samples + 1), key=abs)
-        lag_s = period * min(lags, key=lambda k: both.score(k * period))
-    comparison = Comparison(
+    if settings.frame not in FRAMES:
+        raise TableError(f"frame = {settings.frame!r}: expected {', '.join(FRAMES)}")
+    pair = Pair(a, b, names, leave_out=settings.mask)
+    counts = _counts(b, pair.b_time, settings, names[1])
+    lag_s = pair.best_lag_s(counts, settings.max_lag_samples) if settings.lag == "estimate" else settings.lag
+    rows, removed = pair.at(lag_s, counts).in_one_frame(settings.frame)
+    columns, orientations = rows.columns(), rows.orientation_figures()
+    if not columns and not orientations:
+        raise TableError(f"{names[0]} and {names[1]} share no instant at which both are known")
+    cut_by, cut = _cut(rows, pair.units, settings.repetitions, names[1])
+    aligned = None
+    if lag_s or removed is not None:
+        aligned = Aligned(
+            lag_s=lag_s,
+            frame=removed,
+            before=_by_unit(pair.at(0.0, counts), pair.units),
+            after=_by_unit(rows, pair.units),
+        )
+    known = {n: agreement(x[counts], y[counts]) for n, (x, y) in rows.numbers.items()}
+    found = Comparison(
         a=names[0],
         b=names[1],
-        rows=int(both.counts.sum()),
+        rows=int(counts.sum()),
         lag_s=lag_s,
         mask=settings.mask,
-        columns=both.columns(lag_s),
-        orientations=both.orientations(lag_s),
-        relative=both.relative(lag_s),
+        aligned=aligned,
+        columns=columns,
+        units={n: u for n, u in pair.units.items() if n in columns},
+        orientations=orientations,
+        relative=rows.relative(),
+        agreement={n: figures for n, figures in known.items() if figures is not None},
+        repetitions_of=cut_by,
+        repetitions=cut,
+        per_repetition=_per_repetition(rows, cut),
     )
-    if not comparison.columns and not comparison.orientations:
-        raise TableError(f"{names[0]} and {names[1]} share no instant at which both are known")
-    return replace(comparison, units={n: u for n, u in both.units.items() if n in comparison.columns})
+    return found, rows
 
 
-class _Pair:
-    """Two tables, what they have in common, and errors at any lag."""
+def _by_unit(rows: Matched, units: dict[str, str]) -> dict[str, float]:
+    """Return the mean RMSE of all orientations, of what lies between neighbours, and of columns by unit."""
+    kinds = {
+        "orientations, deg": [o.total.rmse for o in rows.orientation_figures().values()],
+        "between neighbours, deg": [e.rmse for e in rows.relative().values()],
+    }
+    for name, figures in rows.columns().items():
+        kinds.setdefault(f"columns, {units[name]}" if units[name] else "columns", []).append(figures.rmse)
+    return {kind: float(np.mean(errors)) for kind, errors in kinds.items() if errors}
 
-    def __init__(self, a: Table, b: Table, settings: CompareSettings, names: tuple[str, str]) -> None:
-        self._a, self._b = a.columns, b.columns
-        a_name, self.a_time = al.time_of(a, names[0])
-        b_name, self.b_time = al.time_of(b, names[1])
-        common = [n for n in b.columns if n in a.columns and n not in (a_name, b_name, settings.mask)]
-        stems = al.orientation_stems(common)
-        self.stems = sorted(stems, key=al.outwards)
-        self.numbers = [
-            n
-            for n in common
-            if not al.is_orientation(n)
-            and a.columns[n].dtype.kind in "if"
-            and b.columns[n].dtype.kind in "if"
-        ]
-        self.units = {n: a.units.get(n) or b.units.get(n, "") for n in self.numbers}
-        for n in self.numbers:
-            if a.units.get(n) and b.units.get(n) and a.units[n] != b.units[n]:
-                raise TableError(f"column {n}: {names[0]} is in {a.units[n]}, {names[1]} in {b.units[n]}")
-        self.counts = _counts(b, self.b_time, settings, names[1])
 
-    def _times(self, lag_s: float) -> Floats:
-        return al.snapped(self.b_time + lag_s, self.a_time)
+FEWEST = 3
+"""Repetitions below which nothing is said about them."""
 
-    def _errors(self, error: Floats) -> ErrorFigures | None:
-        return error_figures(error[self.counts])
 
-    def columns(self, lag_s: float) -> dict[str, ErrorFigures]:
-        """Return the error of every common number; degrees within half a turn."""
-        found = {}
-        for n in self.numbers:
-            turns = self.units[n] == "deg"
-            a, b = (side[n].astype(np.float64) for side in (self._a, self._b))
-            error = al.difference(
-                al.numbers_at(self._times(lag_s), self.a_time, a, turns=turns), b, turns=turns
-            )
-            if (figures := self._errors(error)) is not None:
-                found[n] = figures
-        return found
-
-    def _pair_of(self, stem: str, lag_s: float) -> tuple[Floats, Floats]:
-        a = al.orientations_at(self._times(lag_s), self.a_time, al.quaternions(self._a, stem))
-        return a, al.quaternions(self._b, stem)
-
-    def orientations(self, lag_s: float) -> dict[str, OrientationFigures]:
-        """Return the error of every common orientation."""
-        found = {}
-        for stem in self.stems:
-            parts = [self._errors(e) for e in orientation_errors_deg(*self._pair_of(stem, lag_s))]
-            total, heading, inclination = parts
-            if total is not None and heading is not None and inclination is not None:
-                found[stem] = OrientationFigures(total=total, heading=heading, inclination=inclination)
-        return found
-
-    def relative(self, lag_s: float) -> dict[str, ErrorFigures]:
-        """Return the error of each orientation as seen from the one before it on the same arm."""
-        found = {}
-        for first, second in al.neighbours(self.stems):
-            a, b = zip(self._pair_of(first, lag_s), self._pair_of(second, lag_s), strict=True)
-            total, _, _ = orientation_errors_deg(_seen_from(*a), _seen_from(*b))
-            if (figures := self._errors(total)) is not None:
-                found[f"{second} from {first}"] = figures
-        return found
-
-    def score(self, lag_s: float) -> float:
-        """Return what the best lag makes smallest: errors between neighbours, else whole, else of columns."""
-        kinds: tuple[Callable[[], list[float]], ...] = (
-            lambda: [e.rmse for e in self.relative(lag_s).values()],
-            lambda: [o.total.rmse for o in self.orientations(lag_s).values()],
-            lambda: [e.rmse / (self._spread(n) or 1.0) for n, e in self.columns(lag_s).items()],
+def _cut(rows: Matched, units: dict[str, str], chosen: str, name: str) -> tuple[str, list[Repetition]]:
+    """Return the column that cuts the movement into repetitions, and these."""
+    if chosen == NONE:
+        return "", []
+    if chosen == AUTO:
+        angles = {
+            n: float(np.ptp(b[rows.counts][np.isfinite(b[rows.counts])]))
+            for n, (_, b) in rows.numbers.items()
+            if units[n] == "deg" and np.isfinite(b[rows.counts]).any()
+        }
+        if not angles:
+            return "", []
+        chosen = max(angles, key=angles.__getitem__)
+    elif chosen not in rows.numbers:
+        raise TableError(
+            f"{name}: repetitions by {chosen!r}: expected a column of both, {', '.join(rows.numbers)}"
         )
-        for kind in kinds:
-            if errors := kind():
-                return float(np.mean(errors))
-        return float("inf")
-
-    def _spread(self, name: str) -> float:
-        values = self._b[name].astype(np.float64)[self.counts]
-        return float(np.nanstd(values)) if np.isfinite(values).any() else 0.0
+    values = np.where(rows.counts, rows.numbers[chosen][1], np.nan)
+    found = repetitions(rows.time, values)
+    return (chosen, found) if len(found) >= FEWEST else ("", [])
 
 
-def _seen_from(first: Floats, second: Floats) -> Floats:
-    return multiply(inverse(first), second)
+def _per_repetition(rows: Matched, cut: list[Repetition]) -> dict[str, PerRepetition]:
+    inside = [rows.counts & (rows.time >= r.from_s) & (rows.time <= r.to_s) for r in cut]
+    found = {}
+    for name, (a, b) in rows.numbers.items():
+        known = [i & np.isfinite(a) & np.isfinite(b) for i in inside]
+        parts = [(a[k], b[k]) for k in known if k.any()]
+        if len(parts) < FEWEST:
+            continue
+        rmse = error_figures([float(np.sqrt(np.mean((x - y) ** 2))) for x, y in parts])
+        highest = agreement(*_each(parts, np.max))
+        reach = agreement(*_each(parts, np.ptp))
+        assert rmse is not None
+        assert highest is not None
+        assert reach is not None
+        found[name] = PerRepetition(rmse=rmse, highest=highest, reach=reach)
+    return found
+
+
+def _each(parts: list[tuple[Floats, Floats]], what: Any) -> tuple[list[float], list[float]]:
+    return [float(what(a)) for a, _ in parts], [float(what(b)) for _, b in parts]
 
 
 def _counts(b: Table, time: Floats, settings: CompareSettings, name: str) -> Mask:
@@ -217,28 +239,3 @@ def _counts(b: Table, time: Floats, settings: CompareSettings, name: str) -> Mas
     if settings.to_s is not None:
         counts &= time <= settings.to_s
     return counts
-
-
-def text(comparison: Comparison) -> str:
-    """Return the comparison as a table for people."""
-    c = comparison
-    lines = [f"{c.a} against {c.b}: {c.rows} rows" + (f" where {c.mask}" if c.mask else "")]
-    if c.lag_s:
-        lines.append(f"lag {1e3 * c.lag_s:.1f} ms")
-    lines += ["", f"{'':<44}{'RMSE':>10}{'bias':>10}{'SD':>10}{'largest':>10}{'n':>9}"]
-    for stem, o in c.orientations.items():
-        lines += [_line(f"{stem}, whole angle, deg", o.total)]
-        lines += [_line("  heading, deg", o.heading), _line("  inclination, deg", o.inclination)]
-    lines += [_line(f"{pair}, deg", e) for pair, e in c.relative.items()]
-    for name, e in c.columns.items():
-        unit = c.units.get(name, "")
-        lines.append(_line(f"{name}, {unit}" if unit else name, e))
-    return "\n".join(lines) + "\n"
-
-
-def _line(name: str, e: ErrorFigures) -> str:
-    rmse, bias, sd, largest = (
-        0.0 if name.endswith("deg") and abs(x) < ROUNDING_DEG else x
-        for x in (e.rmse, e.bias, e.sd, e.max_abs)
-    )
-    return f"{name:<44}{rmse:>10.4g}{bias:>10.3g}{sd:>10.3g}{largest:>10.4g}{e.n:>9}"

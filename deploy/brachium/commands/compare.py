@@ -20,26 +20,43 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--mask", metavar="COLUMN", help="of B; only rows count where it is true")
     parser.add_argument("--from", dest="from_s", type=real(), metavar="S", help="only from this time of B on")
     parser.add_argument("--to", dest="to_s", type=real(), metavar="S", help="only up to this time of B")
+    parser.add_argument(
+        "--frame",
+        choices=("none", "rigid", "heading"),
+        help="turn (and shift) A onto B first: not at all (default), wholly, or about the vertical",
+    )
+    parser.add_argument(
+        "--repetitions",
+        metavar="COLUMN",
+        help="what rises once a repetition (default auto: the angle that moves most; none: no cutting)",
+    )
+    parser.add_argument(
+        "--figure", type=Path, metavar="FILE", help="draw Bland-Altman plots (.svg, .png or .pdf)"
+    )
     add_json(parser)
 
 
 def run(args: argparse.Namespace) -> int:
     """Compare, and tell."""
-    from brachium_viewer import compare
+    from brachium_viewer import compare, compare_text
 
     for path in (args.a, args.b):
         if not path.exists():
             raise FileNotFoundError(2, "no such file", str(path))
     chosen: dict[str, Any] = {
-        name: value for name in ("mask", "from_s", "to_s") if (value := getattr(args, name)) is not None
+        name: value
+        for name in ("mask", "from_s", "to_s", "frame", "repetitions")
+        if (value := getattr(args, name)) is not None
     }
     if args.lag is not None:
         chosen["lag"] = args.lag if args.lag == "estimate" else _seconds(args.lag)
-    found = compare.compare(args.a, args.b, replace(compare.settings_beside(args.b), **chosen))
+    found = compare.compare(
+        args.a, args.b, replace(compare.settings_beside(args.b), **chosen), figure=args.figure
+    )
     if args.json:
         print_json(found)
     else:
-        print(compare.text(found), end="")
+        print(compare_text.text(found), end="")
     return 0
 
 
