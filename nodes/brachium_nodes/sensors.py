@@ -133,14 +133,14 @@ class Chip:
         )
 
     def read(
-        self, acc: Array, gyr: Array, mag: Array, rate_hz: float, drift: Array, random: np.random.Generator
+        self, acc: Array, gyr: Array, mag: Array, rate_hz: float, drift: Array, white: Array
     ) -> tuple[Array, Array, Array]:
         """Return raw readings (n, 3) of true specific force, angular rate and field in sensor axes.
 
-        `drift` (n, 3) rad/s is where the gyro's bias has walked to. White noise of a density over the band
-        rate_hz / 2 has the variance density^2 rate_hz / 2.
+        `drift` (n, 3) rad/s is where the gyro's bias has walked to; `white` (3, n, 3) is noise of variance 1.
+        White noise of a density over the band rate_hz / 2 has the variance density^2 rate_hz / 2.
         """
-        e, c, white = self.errors, self.calibration, random.standard_normal((3, *acc.shape))
+        e, c = self.errors, self.calibration
         band = sqrt(rate_hz / 2.0)
         acc = acc * self.accel_factor + self.accel_bias + e.accel_noise * band * white[0]
         gyr = gyr * self.gyro_factor + self.gyro_bias + drift + e.gyro_noise * band * white[1]

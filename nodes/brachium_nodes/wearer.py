@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 from heapq import merge
-from math import ceil, sqrt
+from math import ceil
 
 import numpy as np
 import numpy.typing as npt
@@ -19,8 +19,9 @@ from brachium_body.segments import SEGMENTS, Segment, Side, arm_segments
 from brachium_nodes.link import EmulatedClock, FaultSettings, Injected, departures
 from brachium_nodes.mounting import Worn
 from brachium_nodes.movement import Array
+from brachium_nodes.noise import Noise
 from brachium_nodes.person import Person, PersonSettings
-from brachium_nodes.sensors import CHIP, LEVELS, Chip, Level, generator
+from brachium_nodes.sensors import CHIP, LEVELS, Chip, Level
 from brachium_nodes.truth import Truth, arm_truth, skeletons
 from brachium_wire.messages import Quaternion, SensorCalibration, Skeleton
 
@@ -117,23 +118,23 @@ class Wearer:
         self.person = Person(settings)
         self.segments = settings.worn()
         seed, errors = settings.seed, LEVELS[settings.level]
-        self._errors = errors
-        self._worn: dict[Segment, Worn] = {s: Worn.put_on(s, self.person, errors) for s in self.segments}
-        self._chips = {s: Chip.draw(errors, seed, s) for s in self.segments}
+        self.errors = errors
+        self.straps: dict[Segment, Worn] = {s: Worn.put_on(s, self.person, errors) for s in self.segments}
+        self.chips = {s: Chip.draw(errors, seed, s) for s in self.segments}
         self.clocks = {
             s: EmulatedClock.draw(settings.rate_hz, settings.skew_ppm, seed, s) for s in self.segments
         }
         self._size = ceil(settings.rate_hz)
+        self._noise = {s: Noise(errors, seed, s, settings.rate_hz) for s in self.segments}
         self._block = lru_cache(maxsize=3 * len(self.segments))(self._make_block)
-        self._walk = lru_cache(maxsize=2 * len(self.segments))(self._make_walk)
 
     def info(self, segment: Segment) -> SensorInfo:
         """Return what is known of a segment's sensor."""
         return SensorInfo(
             chip=CHIP,
             rate_hz=self.settings.rate_hz,
-            mounting=self._worn[segment].place.mounting,
-            calibration=self._chips[segment].calibration,
+            mounting=self.straps[segment].place.mounting,
+            calibration=self.chips[segment].calibration,
         )
 
     def samples(self, segment: Segment, first: int, count: int) -> Readings:
@@ -171,7 +172,7 @@ class Wearer:
     def truth(self, time_s: npt.ArrayLike, side: Side) -> Truth:
         """Return what one arm really does at true times (n,) s; angles in their principal ranges."""
         t = np.atleast_1d(np.asarray(time_s, dtype=np.float64))
-        return arm_truth(self.person, self._worn, t, side)
+        return arm_truth(self.person, self.straps, t, side)
 
     def skeletons(
         self, time_s: npt.ArrayLike, side: Side, start_ns: int, tracker: AngleTracker
@@ -198,28 +199,6 @@ class Wearer:
         index = np.arange(block * self._size, (block + 1) * self._size)
         clock = self.clocks[segment]
         t = clock.sample_time_s(index)
-        acc, gyr, mag = self._worn[segment].truth(t, clock.period_s, self.person)
-        random = generator(self.settings.seed, segment, "noise", block)
-        drift = self._drift(segment, block)
-        return t, *self._chips[segment].read(acc, gyr, mag, self.settings.rate_hz, drift, random)
-
-    def _drift(self, segment: Segment, block: int) -> Array:
-        """Return where the gyro's bias has walked to, (samples, 3): straight between a block's ends."""
-        page, row = divmod(block, _PAGE)
-        walk = self._walk(segment, page)
-        share = (np.arange(self._size) / self._size)[:, None]
-        drift: Array = walk[row] + share * (walk[row + 1] - walk[row])
-        return drift
-
-    def _make_walk(self, segment: Segment, page: int) -> Array:
-        """Return the walk (_PAGE + 1, 3) rad/s at the ends of a page's blocks."""
-        start = self._walk(segment, page - 1)[-1] if page else np.zeros(3)
-        random = generator(self.settings.seed, segment, "walk", page)
-        size = self._errors.gyro_walk * sqrt(self._size / self.settings.rate_hz)
-        steps = size * random.standard_normal((_PAGE, 3))
-        walk: Array = start + np.concatenate([np.zeros((1, 3)), np.cumsum(steps, axis=0)])
-        return walk
-
-
-_PAGE = 4096
-"""Blocks whose walk is drawn at once: more than an hour."""
+        acc, gyr, mag = self.straps[segment].truth(t, clock.period_s, self.person)
+        white, drift = self._noise[segment].block(block)
+        return t, *self.chips[segment].read(acc, gyr, mag, self.settings.rate_hz, drift, white)
