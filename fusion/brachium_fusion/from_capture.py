@@ -10,6 +10,7 @@ from brachium_body import rotation
 from brachium_body.segments import Segment, part_of
 from brachium_fusion.pipeline import Pipeline
 from brachium_fusion.pose import Alignment
+from brachium_fusion.rows import check_session
 from brachium_fusion.subject import Settings, Subject
 from brachium_wire.capture import Capture, CaptureSegment
 from brachium_wire.messages import Info, SensorCalibration, Session
@@ -47,14 +48,17 @@ def infos(capture: Capture) -> dict[str, Info]:
 
 
 def session(capture: Capture) -> Session:
-    """Return what capture.toml says of the subject."""
+    """Return what capture.toml says of the subject; raises ValueError for an angle that no arm has."""
     settings = capture.settings
-    return Session(
+    said = Session(
         side=settings.side,
         height_m=settings.height_m,
         lengths_m={str(k): v for k, v in settings.lengths_m.items()},
         facing_deg=settings.facing_deg,
+        assumed_angles_deg=settings.assumed_angles_deg,
     )
+    check_session(said)
+    return said
 
 
 def output_times(capture: Capture, rate_hz: float | None) -> Floats:

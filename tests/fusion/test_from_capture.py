@@ -177,3 +177,20 @@ def test_bad_input_is_one_line(tmp_path) -> None:
         run(SolveSettings(input=tmp_path / "nothing"))
     with pytest.raises(SolveError, match="--rate must be"):
         run(SolveSettings(input=tmp_path, rate_hz=0.0))
+
+
+def test_angles_of_joints_without_a_sensor_are_as_the_capture_states(made, tmp_path) -> None:
+    folder = capture_folder(
+        tmp_path / "c", made, toml=f"assumed_angles_deg = {{ elbow_flexion = 30 }}\n{POSE}"
+    )
+    for segment in ("forearm_r", "hand_r"):
+        (folder / f"{segment}.csv").unlink()
+    (skeleton, *_) = run(SolveSettings(input=folder, rate_hz=10.0)).skeletons
+    upper, fore = (skeleton.positions[j] for j in ("elbow", "wrist"))
+    assert np.degrees(np.arctan2(fore[1] - upper[1], upper[2] - fore[2])) == pytest.approx(30.0, abs=1.0)
+
+
+def test_an_assumed_angle_that_no_arm_has_is_refused(made, tmp_path) -> None:
+    folder = capture_folder(tmp_path / "c", made, toml="assumed_angles_deg = { knee_flexion = 30 }")
+    with pytest.raises(ValueError, match="knee_flexion"):
+        run(SolveSettings(input=folder, rate_hz=10.0))

@@ -24,6 +24,7 @@ FULL = CaptureSettings(
     rate_hz=100.0,
     lengths_m={"upper_arm": 0.33, "hand": 0.19},
     facing_deg=90.0,
+    assumed_angles_deg={"elbow_flexion": 5.0},
     mounting={"forearm_l": (0.0, 1.0, 0.0, 0.0)},
     sensor={"forearm_l": SensorCalibration(gyro_bias=(0.01, 0.0, -0.01))},
     calibration=CalibrationSpans(
@@ -155,6 +156,10 @@ def test_a_wrong_segment_file_is_named_in_one_line(tmp_path: Path, text: str, sa
         ("rate_hz = 0", "rate_hz = 0: expected 1 to 2000"),
         ("rate_hz = 2001", "rate_hz = 2001: expected 1 to 2000"),
         ("facing_deg = 361", "facing_deg = 361: expected degrees, -360 to 360"),
+        (
+            "assumed_angles_deg = { elbow_flexion = 400 }",
+            "assumed_angles_deg.elbow_flexion = 400: expected degrees, -360 to 360",
+        ),
         ("facing_deg = nan", "facing_deg = nan: expected degrees, -360 to 360"),
         ("mounting = 3", "mounting: expected a table"),
         ("sensor = { forearm_r = 3 }", "sensor.forearm_r: expected a table"),

@@ -77,6 +77,8 @@ class CaptureSettings(_Strict, frozen=True, kw_only=True):
     height_m: float | None = None
     lengths_m: dict[Length, float] = msgspec.field(default_factory=dict)
     facing_deg: float | None = None
+    assumed_angles_deg: dict[str, float] = msgspec.field(default_factory=dict)
+    """Joint angles that hold throughout, of joints that no sensor sees."""
     mounting: dict[Segment, Quaternion] = msgspec.field(default_factory=dict)
     """segment_from_sensor, of length 1."""
     sensor: dict[Segment, SensorCalibration] = msgspec.field(default_factory=dict)
@@ -170,6 +172,7 @@ def _check(settings: CaptureSettings) -> None:
         if metres is not None and not 0.0 < metres <= MAX_HEIGHT_M:
             raise CaptureError(f"{entry} = {metres:g}: expected metres, above 0 and at most {MAX_HEIGHT_M:g}")
     angles = {f"calibration.angles_deg.{name}": a for name, a in settings.calibration.angles_deg.items()}
+    angles |= {f"assumed_angles_deg.{name}": a for name, a in settings.assumed_angles_deg.items()}
     for entry, degrees in {"facing_deg": settings.facing_deg, **angles}.items():
         if degrees is not None and not -360.0 <= degrees <= 360.0:
             raise CaptureError(f"{entry} = {degrees:g}: expected degrees, -360 to 360")
