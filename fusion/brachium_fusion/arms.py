@@ -20,7 +20,7 @@ from brachium_body.segments import SIDES, Side
 from brachium_fusion.rows import Row
 from brachium_fusion.skeletons import messages
 from brachium_fusion.subject import Settings
-from brachium_fusion.track import Reading
+from brachium_fusion.timeline import Reading
 from brachium_wire.messages import Skeleton
 
 Floats = npt.NDArray[np.float64]

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from brachium_fusion.pose import POSES, PoseName, pose_orientations
-from brachium_fusion.track import Reading
+from brachium_fusion.timeline import Reading
 
 Floats = npt.NDArray[np.float64]
 

@@ -13,7 +13,7 @@ from brachium_body.lengths import ArmLengths, from_measured
 from brachium_body.segments import SIDES, Side, arm_segments
 from brachium_fusion.pose import Alignment
 from brachium_fusion.subject import Instant, Subject
-from brachium_fusion.track import Reading
+from brachium_fusion.timeline import Reading
 from brachium_wire.messages import Forward, Origin, Quality, Session
 
 Floats = npt.NDArray[np.float64]

@@ -17,7 +17,8 @@ from brachium_body.segments import SEGMENTS, Side
 from brachium_fusion.orientation import FilterName
 from brachium_fusion.pose import Alignment, PoseName, PoseSensor, align, pose_orientations
 from brachium_fusion.pose_watch import HeldPose, PoseWatch, PoseWish
-from brachium_fusion.track import Reading, SegmentTrack
+from brachium_fusion.timeline import Reading
+from brachium_fusion.track import SegmentTrack
 from brachium_wire.codec import Drop
 from brachium_wire.messages import Calibration, Info, Session
 from brachium_wire.samples import Samples
@@ -185,7 +186,7 @@ class Subject:
             return
         self.received_ns = max(self.received_ns, samples.received_ns)
         if self._next_ns is None:
-            self._next_ns, self._begun_ns = self._first_tick(track.first_ns), samples.received_ns
+            self._next_ns, self._begun_ns = self._first_tick(track.timeline.first_ns), samples.received_ns
         if track.reboots != reboots and track.info.origin != "worn":
             self._begin_anew()
         if track.restarts != restarts:
@@ -237,7 +238,7 @@ class Subject:
             solved = now
         if solved is not None:
             for track in self.tracks.values():
-                track.forget(self._next_ns or solved)
+                track.timeline.forget(self._next_ns or solved)
 
     def _readings(self, now: int) -> dict[str, Reading | None] | None:
         """Return every segment's orientation, or None while one that is alive has not come so far."""
@@ -254,10 +255,10 @@ class Subject:
         readings: dict[str, Reading | None] = {}
         for segment, track in self.tracks.items():
             if track.last_ns >= now:
-                readings[segment] = track.at(now)
+                readings[segment] = track.timeline.at(now)
             elif track.last_ns:
                 gone = self._ended or self._behind(track) > MISSING_NS
-                readings[segment] = None if gone else track.latest()
+                readings[segment] = None if gone else track.timeline.latest()
         return readings
 
     def _beginning(self) -> bool:
@@ -282,7 +283,8 @@ class Subject:
         """Return the next tick after a stretch in which nothing was measured."""
         if self._times is not None:
             return self._following(now)
-        begins = [t for t in (track.next_sample_ns(now) for track in self.tracks.values()) if t is not None]
+        nexts = (track.timeline.next_sample_ns(now) for track in self.tracks.values())
+        begins = [t for t in nexts if t is not None]
         return max(
             now + self._period_ns, -(-min(begins) // self._period_ns) * self._period_ns if begins else 0
         )

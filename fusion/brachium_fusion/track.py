@@ -1,15 +1,14 @@
 """One segment's sensor over time: batches in, orientation at any instant within what was received. Pure."""
 
-from bisect import bisect_left
-from collections import Counter, deque
-from dataclasses import dataclass
-from typing import Any, NamedTuple
+from collections import Counter
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from brachium_body import rotation
 from brachium_fusion.orientation import FilterName, OrientationFilter, make
+from brachium_fusion.timeline import Block, Timeline
 from brachium_wire.codec import Drop
 from brachium_wire.messages import Info, Quality
 from brachium_wire.samples import Samples
@@ -31,33 +30,6 @@ DISTURBED_NS = 2_000_000_000
 """A magnetic disturbance is reported once it lasted this long; brushing past a chair is not worth a flag."""
 
 
-class Reading(NamedTuple):
-    """The orientation at an instant lies at `fraction` of the way between two samples."""
-
-    before: Floats
-    after: Floats
-    fraction: float
-    quality: Quality
-    sequence: int
-    received_ns: int
-
-
-@dataclass(slots=True, eq=False)
-class _Block:
-    """A batch after the filter, and the last sample before it."""
-
-    before_ns: int
-    """0 when there is none."""
-    before: Floats
-    times: list[int]
-    quats: Floats
-    first_sequence: int
-    received_ns: int
-    gap: Quality | None
-    """What an instant before its first sample is: held, missing, or None where there is no gap."""
-    disturbed: bool
-
-
 class SegmentTrack:
     """Everything about one sensor that changes. `feed` takes batches in order of arrival."""
 
@@ -72,9 +44,9 @@ class SegmentTrack:
         """The longest time that a recent batch spanned: how far behind a healthy sensor may seem."""
         self._filter_name: FilterName = filter_name
         self._filter = self._new_filter()
-        self._blocks: deque[_Block] = deque()
-        self._last_gyr: Floats | None = None
-        self._last_acc: Floats | None = None
+        self.timeline = Timeline()
+        self._last: Floats | None = None
+        """gyr and acc of the last sample."""
         self._disturbed_since: int | None = None
         self._settled_ns = 0
         self.restarts = 0
@@ -136,11 +108,11 @@ class SegmentTrack:
         mag = samples.mag
         if mag is not None and self._calibrate_mag:
             mag = (mag - self._mag_offset) @ self._mag_matrix.T
-        silence = samples.time_ns[0] - self.last_ns if self._blocks else 0
+        silence = samples.time_ns[0] - self.last_ns if self.timeline else 0
         kind: Quality | None = None
         period_ns = 1e9 / self.info.rate_hz
         missing = round(silence / period_ns) - 1 if gap or silence > 2.5 * period_ns else 0
-        if missing > 0 and self._blocks:
+        if missing > 0 and self.timeline:
             kind = "held" if silence <= BRIDGE_NS else "missing"
             if kind == "missing":
                 self._settled_ns = samples.time_ns[0] + SETTLE_NS
@@ -150,33 +122,33 @@ class SegmentTrack:
             else:
                 self._bridge(gyr[0], acc[0], missing)
         quats = self._filter.update(gyr, acc, mag, samples.mag_index)
-        self._last_gyr, self._last_acc = gyr[-1], acc[-1]
+        motion = np.empty((len(gyr) + 1, 6))
+        motion[1:, :3], motion[1:, 3:] = gyr, acc
+        motion[0] = motion[1] if self._last is None else self._last
+        self._last = motion[-1]
         self._note_still(gyr, samples.time_ns)
-        self._append(samples, quats, kind, self._is_disturbed(samples.time_ns[-1]))
+        self._append(samples, quats, motion, kind, self._is_disturbed(samples.time_ns[-1]))
 
     def _bridge(self, gyr: Floats, acc: Floats, missing: int) -> None:
         """Carry the filter over missing samples along a straight line between the ends of the gap."""
-        assert self._last_gyr is not None
-        assert self._last_acc is not None
+        assert self._last is not None
+        last_gyr, last_acc = self._last[:3], self._last[3:]
         part = (np.arange(1, missing + 1) / (missing + 1.0))[:, None]
         self._filter.update(
-            self._last_gyr + part * (gyr - self._last_gyr),
-            self._last_acc + part * (acc - self._last_acc),
-            None,
-            None,
+            last_gyr + part * (gyr - last_gyr), last_acc + part * (acc - last_acc), None, None
         )
 
     def _feed_orientation(self, samples: Samples) -> None:
         quats = samples.quat
         assert quats is not None
-        silence = samples.time_ns[0] - self.last_ns if self._blocks else 0
+        silence = samples.time_ns[0] - self.last_ns if self.timeline else 0
         kind: Quality | None = None
-        if self._blocks and silence > 2.5e9 / self.info.rate_hz:
+        if self.timeline and silence > 2.5e9 / self.info.rate_hz:
             kind = "held" if silence <= BRIDGE_NS else "missing"
-        previous = self._blocks[-1].quats[-1] if self._blocks else quats[0]
+        previous = self.timeline.last.quats[-1] if self.timeline else quats[0]
         steps = rotation.angle_between(np.vstack([previous, quats[:-1]]), quats) * self.info.rate_hz
         self._note_still(np.column_stack([steps, np.zeros((len(steps), 2))]), samples.time_ns)
-        self._append(samples, quats, kind, disturbed=False)
+        self._append(samples, quats, None, kind, disturbed=False)
 
     def _note_still(self, gyr: Floats, times: list[int]) -> None:
         if self.still_since_ns == 0:
@@ -201,77 +173,26 @@ class SegmentTrack:
             self._disturbed_since = now_ns
         return now_ns - self._disturbed_since >= DISTURBED_NS
 
-    def _append(self, samples: Samples, quats: Floats, gap: Quality | None, disturbed: bool) -> None:
+    def _append(
+        self, samples: Samples, quats: Floats, motion: Floats | None, gap: Quality | None, disturbed: bool
+    ) -> None:
         before_ns, before = 0, quats[0]
-        if self._blocks:
-            last = self._blocks[-1]
+        if self.timeline:
+            last = self.timeline.last
             before_ns, before = last.times[-1], last.quats[-1]
-        self._blocks.append(
-            _Block(
+        self.timeline.append(
+            Block(
                 before_ns,
                 before,
                 samples.time_ns,
                 quats,
+                motion,
                 samples.sequence,
                 samples.received_ns,
                 gap,
                 disturbed,
             )
         )
-
-    @property
-    def first_ns(self) -> int:
-        """Host time of the oldest sample still held; 0 before any."""
-        return self._blocks[0].times[0] if self._blocks else 0
-
-    def at(self, time_ns: int) -> Reading | None:
-        """Return the orientation at an instant up to `last_ns`, or None where nothing was measured."""
-        for block in self._blocks:
-            if time_ns <= block.times[-1]:
-                break
-        else:
-            return None
-        quality: Quality = "disturbed" if block.disturbed else "good"
-        after = bisect_left(block.times, time_ns)
-        t1 = block.times[after]
-        if after > 0:
-            t0, before = block.times[after - 1], block.quats[after - 1]
-        elif time_ns == t1:
-            t0, before = t1, block.quats[0]
-        elif block.before_ns == 0 or time_ns < block.before_ns or block.gap == "missing":
-            return None
-        else:
-            t0, before = block.before_ns, block.before
-            quality = block.gap or quality
-        return Reading(
-            before,
-            block.quats[after],
-            (time_ns - t0) / (t1 - t0) if t1 > t0 else 1.0,
-            quality,
-            block.first_sequence + after,
-            block.received_ns,
-        )
-
-    def next_sample_ns(self, after_ns: int) -> int | None:
-        """Return the time of the first sample later than an instant, or None while there is none."""
-        for block in self._blocks:
-            if block.times[-1] > after_ns:
-                return next(t for t in block.times if t > after_ns)
-        return None
-
-    def latest(self) -> Reading | None:
-        """Return the last orientation there is, marked held."""
-        if not self._blocks:
-            return None
-        block = self._blocks[-1]
-        sequence = block.first_sequence + len(block.times) - 1
-        return Reading(block.quats[-1], block.quats[-1], 0.0, "held", sequence, block.received_ns)
-
-    def forget(self, before_ns: int) -> None:
-        """Let go of batches that end before an instant; the last one is always kept."""
-        blocks = self._blocks
-        while len(blocks) > 1 and blocks[0].times[-1] < before_ns:
-            blocks.popleft()
 
     def state(self) -> dict[str, Any]:
         """Return all that changes, as plain values."""
@@ -283,21 +204,8 @@ class SegmentTrack:
             "still_since_ns": self.still_since_ns,
             "batch_ns": self.batch_ns,
             "filter": self._filter.state(),
-            "blocks": [
-                [
-                    b.before_ns,
-                    b.before.tolist(),
-                    b.times,
-                    b.quats.ravel().tolist(),
-                    b.first_sequence,
-                    b.received_ns,
-                    b.gap,
-                    b.disturbed,
-                ]
-                for b in self._blocks
-            ],
-            "last_gyr": None if self._last_gyr is None else self._last_gyr.tolist(),
-            "last_acc": None if self._last_acc is None else self._last_acc.tolist(),
+            "blocks": self.timeline.state(),
+            "last": None if self._last is None else self._last.tolist(),
             "disturbed_since": self._disturbed_since,
             "settled_ns": self._settled_ns,
             "restarts": self.restarts,
@@ -311,10 +219,6 @@ class SegmentTrack:
         self.last_ns, self.still_since_ns = state["last_ns"], state["still_since_ns"]
         self.batch_ns, self.restarts, self.reboots = state["batch_ns"], state["restarts"], state["reboots"]
         self._filter.restore(state["filter"])
-        self._blocks = deque(
-            _Block(before_ns, np.array(before), times, np.array(quats).reshape(-1, 4), *rest)
-            for before_ns, before, times, quats, *rest in state["blocks"]
-        )
-        self._last_gyr = None if state["last_gyr"] is None else np.array(state["last_gyr"])
-        self._last_acc = None if state["last_acc"] is None else np.array(state["last_acc"])
+        self.timeline.restore(state["blocks"])
+        self._last = None if state["last"] is None else np.array(state["last"])
         self._disturbed_since, self._settled_ns = state["disturbed_since"], state["settled_ns"]

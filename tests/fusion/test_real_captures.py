@@ -47,8 +47,8 @@ def test_orientations_are_as_good_as_the_filters_authors_have_them(name: str) ->
     quats = []
     for _, samples in batches(loaded):
         assert track.feed(samples, drops)  # type: ignore[arg-type]
-        quats += [track.at(t).after for t in samples.time_ns]  # type: ignore[union-attr]
-        track.forget(samples.time_ns[-1])
+        quats += [track.timeline.at(t).after for t in samples.time_ns]  # type: ignore[union-attr]
+        track.timeline.forget(samples.time_ns[-1])
     truth = table.read(DATA / name / "truth.parquet").columns
     assert total_error_deg(np.array(quats), truth) <= 1.1 * ONLINE_DEG[name]
 

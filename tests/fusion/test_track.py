@@ -40,7 +40,7 @@ def turning(made, first: int, n: int, rate_rad_s: float = 1.0, **more):
 
 
 def heading_at(track, time_ns: int) -> float:
-    return float(rotation.heading(solved(track.at(time_ns))))
+    return float(rotation.heading(solved(track.timeline.at(time_ns))))
 
 
 @given(
@@ -60,7 +60,7 @@ def test_the_orientation_at_an_instant_is_scipys_slerp_between_the_samples(made,
     times = made.sample_times(0, 20)
     judge = Slerp(np.array(times) - made.START, scipy_of(quats))
     for offset in offsets:
-        reading = track.at(made.START + offset)
+        reading = track.timeline.at(made.START + offset)
         assert reading is not None
         assert reading.quality == "good"
         assert (scipy_of(solved(reading)).inv() * judge(offset)).magnitude() < 1e-7
@@ -70,10 +70,10 @@ def test_the_orientation_at_an_instant_is_scipys_slerp_between_the_samples(made,
 def test_nothing_is_known_before_the_first_and_after_the_last_sample(made) -> None:
     track, _ = tracked(made, [turning(made, 100, 10)])
     first, last = made.sample_times(100, 10)[0], made.sample_times(100, 10)[-1]
-    assert track.at(first - 1) is None
-    assert track.at(first) is not None
-    assert track.at(last) is not None
-    assert track.at(last + 1) is None
+    assert track.timeline.at(first - 1) is None
+    assert track.timeline.at(first) is not None
+    assert track.timeline.at(last) is not None
+    assert track.timeline.at(last + 1) is None
 
 
 @pytest.mark.parametrize("magnetometer", [True, False])
@@ -89,12 +89,12 @@ def test_a_gap_up_to_100_ms_is_held_and_bridged_over_a_turn(made, magnetometer) 
     after = heading_at(track, made.sample_times(109, 1)[0])
     # VQF's rates are averages over the period: ten samples later it has turned ten periods.
     assert after - before == pytest.approx(0.1, abs=1e-3)
-    inside = track.at(made.START + 1045 * MS)
+    inside = track.timeline.at(made.START + 1045 * MS)
     assert inside.quality == "held"
     assert inside.received_ns == made.sample_times(109, 50)[-1] + MS  # its far end came then, and so could it
     assert heading_at(track, made.START + 1045 * MS) == pytest.approx(before + 0.055, abs=1e-3)
-    assert track.at(made.sample_times(99, 1)[0]).quality == "good"
-    assert track.at(made.sample_times(109, 1)[0]).quality == "good"
+    assert track.timeline.at(made.sample_times(99, 1)[0]).quality == "good"
+    assert track.timeline.at(made.sample_times(109, 1)[0]).quality == "good"
     assert track.counter.lost == 9
 
 
@@ -107,28 +107,30 @@ def test_a_gap_beyond_100_ms_is_missing_and_the_filter_is_carried_over(made) -> 
     ]
     track, _ = tracked(made, [*batches, turning(made, 631, 5)], orientation_only=False)
     before = heading_at(track, made.sample_times(99, 1)[0])
-    assert track.at(made.START + 1100 * MS) is None
-    assert track.at(made.sample_times(130, 1)[0]).quality == "disturbed"  # while the filter comes back
-    assert track.at(made.sample_times(632, 1)[0]).quality == "good"
+    assert track.timeline.at(made.START + 1100 * MS) is None
+    assert (
+        track.timeline.at(made.sample_times(130, 1)[0]).quality == "disturbed"
+    )  # while the filter comes back
+    assert track.timeline.at(made.sample_times(632, 1)[0]).quality == "good"
     assert heading_at(track, made.sample_times(130, 1)[0]) - before == pytest.approx(0.31, abs=1e-3)
     assert track.restarts == 0
 
 
 def test_a_gap_beyond_a_second_begins_the_filter_anew(made) -> None:
     track, _ = tracked(made, [turning(made, 0, 100), turning(made, 250, 50)], orientation_only=False)
-    assert track.at(made.START + 2000 * MS) is None
+    assert track.timeline.at(made.START + 2000 * MS) is None
     assert track.restarts == 1
     fresh = make("auto", 1.0 / made.RATE, False).update(
         np.tile([0.0, 0.0, 1.0], (50, 1)), np.tile(UP, (50, 1)), None, None
     )
-    assert np.array_equal(track.latest().after, fresh[-1])
+    assert np.array_equal(track.timeline.latest().after, fresh[-1])
 
 
 @pytest.mark.parametrize(("silence", "quality"), [(2, "good"), (9, "held"), (15, None)])
 def test_gaps_of_a_sensor_that_delivers_orientations(made, silence, quality) -> None:
     still = np.tile(rotation.IDENTITY, (10, 1))
     track, _ = tracked(made, [made.samples(0, quat=still), made.samples(9 + silence, quat=still)])
-    reading = track.at(made.sample_times(9, 1)[0] + 5 * MS)
+    reading = track.timeline.at(made.sample_times(9, 1)[0] + 5 * MS)
     assert (None if reading is None else reading.quality) == quality
 
 
@@ -137,7 +139,7 @@ def test_a_silence_without_a_missing_number_is_a_gap_too(made) -> None:
     track, _ = tracked(
         made, [turning(made, 0, 10), turning(made, 10, 10, times=late)], orientation_only=False
     )
-    assert track.at(made.sample_times(9, 1)[0] + 30 * MS).quality == "held"
+    assert track.timeline.at(made.sample_times(9, 1)[0] + 30 * MS).quality == "held"
     assert track.counter.lost == 0
 
 
@@ -148,12 +150,12 @@ def test_a_huge_jump_of_the_number_in_little_time_costs_nothing(made) -> None:
     track, drops = tracked(made, batches, orientation_only=False)
     assert not drops
     whole, _ = tracked(made, [turning(made, 0, 150)], orientation_only=False)
-    assert np.array_equal(track.latest().after, whole.latest().after)
-    assert track.at(made.START + 995 * MS).quality == "good"
+    assert np.array_equal(track.timeline.latest().after, whole.timeline.latest().after)
+    assert track.timeline.at(made.START + 995 * MS).quality == "good"
 
 
 def latest_of(track):
-    reading = track.latest()
+    reading = track.timeline.latest()
     return reading.after.tolist(), reading.sequence, track.last_ns
 
 
@@ -219,7 +221,7 @@ def test_calibration_is_applied_as_the_wire_page_says(made) -> None:
     )
     track, _ = tracked(made, [raw], orientation_only=False, magnetometer=True, calibration=calibration)
     wanted = make("auto", 1.0 / made.RATE, True).update(gyr, acc, mag, None)
-    assert track.latest().after == pytest.approx(wanted[-1], abs=1e-9)
+    assert track.timeline.latest().after == pytest.approx(wanted[-1], abs=1e-9)
 
 
 def test_a_sensor_that_delivers_orientations_is_taken_at_its_word(made) -> None:
@@ -227,7 +229,7 @@ def test_a_sensor_that_delivers_orientations_is_taken_at_its_word(made) -> None:
     quats = rotation.normalize(random.normal(size=(30, 4)))
     track, _ = tracked(made, [made.samples(0, quat=quats)], magnetometer=True)
     for i, time_ns in enumerate(made.sample_times(0, 30)):
-        assert rotation.angle_between(solved(track.at(time_ns)), quats[i]) < 1e-12
+        assert rotation.angle_between(solved(track.timeline.at(time_ns)), quats[i]) < 1e-12
 
 
 def test_still_begins_after_the_last_turn_that_was_too_fast(made) -> None:
@@ -263,9 +265,9 @@ def test_a_track_put_back_goes_on_as_if_it_had_never_stopped(made, cut) -> None:
         second.feed(batch, before)
     assert before == drops
     assert msgpack.packb(second.state()) == msgpack.packb(whole.state())  # a young filter's state holds NaN
-    for time_ns in range(whole.first_ns, whole.last_ns, 7 * MS):
-        a, b = whole.at(time_ns), second.at(time_ns)
-        if second.first_ns <= time_ns:
+    for time_ns in range(whole.timeline.first_ns, whole.last_ns, 7 * MS):
+        a, b = whole.timeline.at(time_ns), second.timeline.at(time_ns)
+        if second.timeline.first_ns <= time_ns:
             assert (a is None) == (b is None)
             assert a is None or np.array_equal(solved(a), solved(b))
 
@@ -273,13 +275,13 @@ def test_a_track_put_back_goes_on_as_if_it_had_never_stopped(made, cut) -> None:
 def test_what_is_forgotten_is_never_the_last_batch_nor_what_an_instant_needs(made) -> None:
     track, _ = tracked(made, [turning(made, at, 5) for at in range(0, 50, 5)], orientation_only=False)
     instant = made.START + 222 * MS
-    wanted = track.at(instant)
-    track.forget(instant)
-    assert track.first_ns == made.sample_times(20, 1)[0]
-    assert np.array_equal(solved(track.at(instant)), solved(wanted))
-    track.forget(track.last_ns + 10**9)
-    assert track.first_ns == made.sample_times(45, 1)[0]
-    assert track.latest() is not None
+    wanted = track.timeline.at(instant)
+    track.timeline.forget(instant)
+    assert track.timeline.first_ns == made.sample_times(20, 1)[0]
+    assert np.array_equal(solved(track.timeline.at(instant)), solved(wanted))
+    track.timeline.forget(track.last_ns + 10**9)
+    assert track.timeline.first_ns == made.sample_times(45, 1)[0]
+    assert track.timeline.latest() is not None
 
 
 def test_a_disturbed_field_is_told_once_it_lasted_two_seconds(made) -> None:
@@ -295,7 +297,7 @@ def test_a_disturbed_field_is_told_once_it_lasted_two_seconds(made) -> None:
     for at in range(0, 4000, 10):
         part = slice(at, at + 10)
         track.feed(made.samples(at, gyr=gyr[part], acc=acc[part], mag=mag[part]), drops)
-        seen.append(track.at(track.last_ns).quality)
+        seen.append(track.timeline.at(track.last_ns).quality)
     first = seen.index("disturbed") * 10
     assert 2700 <= first <= 2900
 
@@ -307,7 +309,7 @@ def test_a_node_that_was_switched_off_and_on_is_taken_on(made) -> None:
     assert track.reboots == 1
     assert track.counter.received == 150
     assert track.counter.lost == 0
-    assert track.at(again.time_ns[10]) is not None
+    assert track.timeline.at(again.time_ns[10]) is not None
 
 
 def test_an_old_batch_that_comes_again_is_no_new_start(made) -> None:
@@ -316,3 +318,21 @@ def test_an_old_batch_that_comes_again_is_no_new_start(made) -> None:
     )
     assert drops == {"repeated": 50}
     assert track.reboots == 0
+
+
+def test_motion_lies_on_the_line_between_calibrated_samples_and_nowhere_in_a_long_gap(made) -> None:
+    gyr = np.column_stack([np.arange(30.0) * 0.1, np.zeros(30), np.ones(30)])
+    acc = np.tile([0.0, 0.0, 9.81], (30, 1)) + np.arange(30.0)[:, None] * 0.01
+    calibration = SensorCalibration(gyro_bias=(0.0, 0.5, 0.0), accel_scale=(1.0, 1.0, 2.0))
+    batches = [made.samples(n, gyr=gyr[n : n + 10], acc=acc[n : n + 10]) for n in (0, 10)]
+    batches.append(made.samples(40, gyr=gyr[20:], acc=acc[20:]))
+    track, _ = tracked(made, batches, orientation_only=False, calibration=calibration)
+
+    def at(sample: float):
+        return track.timeline.motion_at(made.START + round(sample * 10 * MS))
+
+    for sample in (0.0, 3.0, 3.25, 9.5, 10.0, 19.0):
+        assert at(sample).gyr == pytest.approx([0.1 * sample, -0.5, 1.0])
+        assert at(sample).acc == pytest.approx([0.01 * sample, 0.01 * sample, 2.0 * (9.81 + 0.01 * sample)])
+    assert at(45.0).gyr[0] == pytest.approx(2.5)
+    assert [at(s) for s in (-0.1, 19.5, 39.0, 49.1)] == [None] * 4

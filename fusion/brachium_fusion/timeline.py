@@ -1,0 +1,175 @@
+"""What a sensor showed over the last moments: orientation and motion at any instant between samples. Pure."""
+
+from bisect import bisect_left
+from collections import deque
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from brachium_wire.messages import Quality
+
+Floats = npt.NDArray[np.float64]
+
+
+class Reading(NamedTuple):
+    """The orientation at an instant lies at `fraction` of the way between two samples."""
+
+    before: Floats
+    after: Floats
+    fraction: float
+    quality: Quality
+    sequence: int
+    received_ns: int
+
+
+class Motion(NamedTuple):
+    """Calibrated angular rate (3,) rad/s and specific force (3,) m/s^2 at an instant, in sensor axes."""
+
+    gyr: Floats
+    acc: Floats
+
+
+@dataclass(slots=True, eq=False)
+class Block:
+    """A batch after the filter, and the last sample before it."""
+
+    before_ns: int
+    """0 when there is none."""
+    before: Floats
+    times: list[int]
+    quats: Floats
+    motion: Floats | None
+    """(n + 1, 6) gyr and acc, calibrated: of the last sample before it, then of its own."""
+    first_sequence: int
+    received_ns: int
+    gap: Quality | None
+    """What an instant before its first sample is: held, missing, or None where there is no gap."""
+    disturbed: bool
+
+
+class Timeline:
+    """The newest batches of one sensor."""
+
+    def __init__(self) -> None:
+        self._blocks: deque[Block] = deque()
+
+    def __bool__(self) -> bool:
+        return bool(self._blocks)
+
+    @property
+    def first_ns(self) -> int:
+        """Host time of the oldest sample still held; 0 before any."""
+        return self._blocks[0].times[0] if self._blocks else 0
+
+    @property
+    def last(self) -> Block:
+        """The newest batch; there must be one."""
+        return self._blocks[-1]
+
+    def append(self, block: Block) -> None:
+        """Take the next batch."""
+        self._blocks.append(block)
+
+    def _block_at(self, time_ns: int) -> Block | None:
+        for block in self._blocks:
+            if time_ns <= block.times[-1]:
+                return block
+        return None
+
+    def at(self, time_ns: int) -> Reading | None:
+        """Return the orientation at an instant up to `last_ns`, or None where nothing was measured."""
+        block = self._block_at(time_ns)
+        if block is None:
+            return None
+        quality: Quality = "disturbed" if block.disturbed else "good"
+        after = bisect_left(block.times, time_ns)
+        t1 = block.times[after]
+        if after > 0:
+            t0, before = block.times[after - 1], block.quats[after - 1]
+        elif time_ns == t1:
+            t0, before = t1, block.quats[0]
+        elif block.before_ns == 0 or time_ns < block.before_ns or block.gap == "missing":
+            return None
+        else:
+            t0, before = block.before_ns, block.before
+            quality = block.gap or quality
+        return Reading(
+            before,
+            block.quats[after],
+            (time_ns - t0) / (t1 - t0) if t1 > t0 else 1.0,
+            quality,
+            block.first_sequence + after,
+            block.received_ns,
+        )
+
+    def motion_at(self, time_ns: int) -> Motion | None:
+        """Return rate and force on the straight line between the samples around an instant.
+
+        None where `at` gives nothing, and for a sensor that delivers orientation only.
+        """
+        block = self._block_at(time_ns)
+        if block is None or block.motion is None:
+            return None
+        after = bisect_left(block.times, time_ns)
+        t1, value = block.times[after], block.motion[after + 1]
+        if time_ns < t1:
+            t0 = block.times[after - 1] if after > 0 else block.before_ns
+            if after == 0 and (t0 == 0 or time_ns < t0 or block.gap == "missing"):
+                return None
+            before = block.motion[after]
+            value = before + (time_ns - t0) / (t1 - t0) * (value - before)
+        return Motion(value[:3], value[3:])
+
+    def next_sample_ns(self, after_ns: int) -> int | None:
+        """Return the time of the first sample later than an instant, or None while there is none."""
+        for block in self._blocks:
+            if block.times[-1] > after_ns:
+                return next(t for t in block.times if t > after_ns)
+        return None
+
+    def latest(self) -> Reading | None:
+        """Return the last orientation there is, marked held."""
+        if not self._blocks:
+            return None
+        block = self._blocks[-1]
+        sequence = block.first_sequence + len(block.times) - 1
+        return Reading(block.quats[-1], block.quats[-1], 0.0, "held", sequence, block.received_ns)
+
+    def forget(self, before_ns: int) -> None:
+        """Let go of batches that end before an instant; the last one is always kept."""
+        blocks = self._blocks
+        while len(blocks) > 1 and blocks[0].times[-1] < before_ns:
+            blocks.popleft()
+
+    def state(self) -> list[Any]:
+        """Return all that is held, as plain values."""
+        return [
+            [
+                b.before_ns,
+                b.before.tolist(),
+                b.times,
+                b.quats.ravel().tolist(),
+                None if b.motion is None else b.motion.ravel().tolist(),
+                b.first_sequence,
+                b.received_ns,
+                b.gap,
+                b.disturbed,
+            ]
+            for b in self._blocks
+        ]
+
+    def restore(self, state: list[Any]) -> None:
+        """Go on as the timeline whose state this is would have."""
+        self._blocks = deque(
+            Block(
+                before_ns,
+                np.array(before),
+                times,
+                np.array(quats).reshape(-1, 4),
+                None if motion is None else np.array(motion).reshape(-1, 6),
+                *rest,
+            )
+            for before_ns, before, times, quats, motion, *rest in state
+        )
