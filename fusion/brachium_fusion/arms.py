@@ -65,15 +65,24 @@ class Arms:
         if not (known == 7).all():
             full = complete(measured, left, _stated_rows(rows))
         joints = between(full)
-        raw = joint_angles(*joints, left, calibration_from_thorax=from_pose)
-        codes = provenance(known, thorax_known)
+        shift = _shifts(rows, trunk_from_world)
+        raw = joint_angles(
+            *joints,
+            left,
+            calibration_from_thorax=from_pose,
+            shoulder_shift=None if shift is None else shift[:, 0],
+            chest_to_shoulder=numbers[:, 36],
+        )
+        shift_known = False if shift is None else ~np.isnan(shift[:, 0, 0])
+        codes = provenance(known, thorax_known, shift_known)
         angles = withhold(self._follow(rows, raw, joints.thorax_from_upper_arm, left), codes.angles)
         if self._printed:
             angles[:, :7] = withhold(printed_angles(joints, left), codes.angles[:, :7])
         drifting = np.array([row.withhold_heading for row in rows])
         if drifting.any():
             angles[np.ix_(drifting, _ON_HEADING)] = np.nan
-        places = withhold(positions(*full, numbers[:, 36:], left), codes.positions)
+        moved = None if shift is None else np.nan_to_num(shift[:, 0])
+        places = withhold(positions(*full, numbers[:, 36:], left, moved), codes.positions)
         return messages(
             rows,
             world_from_sensor,
@@ -83,6 +92,7 @@ class Arms:
             codes.angles,
             places,
             codes.positions,
+            shift,
         )
 
     def _follow(
@@ -131,6 +141,19 @@ def _orientations(rows: Sequence[Row]) -> Floats:
     after = np.concatenate([reading.after for reading in readings]).reshape(-1, 4)
     fraction = np.array([reading.fraction for reading in readings])
     return rotation.slerp(before, after, fraction).reshape(-1, 4, 4)
+
+
+def _shifts(rows: Sequence[Row], trunk_from_world: Floats) -> Floats | None:
+    """Return shoulder shift and its sd (n, 2, 3) m in trunk axes, NaN where not known; None without any."""
+    if all(row.shift is None for row in rows):
+        return None
+    result = np.full((len(rows), 2, 3), np.nan)
+    for i, row in enumerate(rows):
+        if row.shift is not None:
+            turn = rotation.to_matrix(trunk_from_world[i])
+            result[i, 0] = turn @ row.shift.metres
+            result[i, 1] = np.sqrt(turn**2 @ row.shift.sd**2)  # of an ellipsoid along the world's axes
+    return result
 
 
 def _turns(arms: npt.NDArray[np.intp]) -> npt.NDArray[np.intp]:

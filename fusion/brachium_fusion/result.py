@@ -96,9 +96,10 @@ def _add_arm(
             for axis, values in zip(_AXES, block.T, strict=True):
                 result.add(f"{joint}_{axis}{ending}", values, "m")
     if "shift" in groups:
-        block = _fill(n, 3, rows, lambda s: s.shoulder_shift)
-        for axis, values in zip(_AXES, block.T, strict=True):
-            result.add(f"shoulder_shift_{axis}{ending}", values, "m")
+        for name in ("shoulder_shift", "shoulder_shift_sd"):
+            block = _fill(n, 3, rows, lambda s, f=name: getattr(s, f))  # type: ignore[misc]
+            for axis, values in zip(_AXES, block.T, strict=True):
+                result.add(f"{name}_{axis}{ending}", values, "m")
     angles = np.degrees(_fill(n, len(COLUMNS), rows, lambda s: [s.angles.get(c, np.nan) for c in COLUMNS]))
     for name, values in zip(COLUMNS, angles.T, strict=True):
         if _group(name) not in groups or (name in TRUNK and not first):

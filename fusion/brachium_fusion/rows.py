@@ -30,6 +30,13 @@ WITHHOLD_DEG = 15.0
 SLOTS: dict[Side, tuple[str, str, str, str]] = {side: ("sternum", *arm_segments(side)) for side in SIDES}
 
 
+class Shift(NamedTuple):
+    """Displacement of a shoulder since the pose, and its standard deviation: (3,) m in world axes."""
+
+    metres: Floats
+    sd: Floats
+
+
 class Row(NamedTuple):
     """One arm at one instant, and all that it is computed from."""
 
@@ -42,6 +49,7 @@ class Row(NamedTuple):
     """Per slot; None where the subject wears no sensor there."""
     frame: "Frame"
     withhold_heading: bool
+    shift: Shift | None = None
 
 
 def rows_of(subject_id: str, subject: Subject, instant: Instant) -> list[Row]:

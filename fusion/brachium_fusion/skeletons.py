@@ -51,10 +51,12 @@ def messages(
     angle_codes: npt.NDArray[np.uint8],
     places: Floats,
     place_codes: npt.NDArray[np.uint8],
+    shift: Floats | None = None,
 ) -> list[Skeleton]:
     """Return one skeleton a row.
 
-    Orientations (n, 4 slots, 4), trunk_from_world (n, 4), angles (n, columns) rad, places (n, joints, 3) m;
+    Orientations (n, 4 slots, 4), trunk_from_world (n, 4), angles (n, columns) rad, places (n, joints, 3) m,
+    shift (n, 2, 3) m, the shoulder's and its standard deviation;
     NaN where nothing is known; the codes say what rests on an assumption (brachium_body.assumptions).
     """
     sensors, segments = world_from_sensor.tolist(), world_from_segment.tolist()
@@ -75,6 +77,7 @@ def messages(
             codes = angle_codes[i].tobytes() + place_codes[i].tobytes()
             assumed = dict(_qualities(row.qualities, codes, (*given, *known)))
         frame = row.frame
+        moved = None if shift is None or shift[i, 0, 0] != shift[i, 0, 0] else shift[i].tolist()
         skeletons.append(
             Skeleton(
                 time_ns=row.time_ns,
@@ -86,6 +89,8 @@ def messages(
                 positions=known,
                 angles=given,
                 assumed=assumed,
+                shoulder_shift=None if moved is None else _three(moved[0]),
+                shoulder_shift_sd=None if moved is None else _three(moved[1]),
                 received_ns=row.received_ns,
             )
         )
@@ -108,6 +113,10 @@ def _poses(row: Row, sensors: list[list[float]], segments: list[list[float]]) ->
                 world_from_sensor=_four(sensors[slot]),
             )
     return poses
+
+
+def _three(values: list[float]) -> tuple[float, float, float]:
+    return (values[0], values[1], values[2])
 
 
 def _four(values: list[float]) -> tuple[float, float, float, float]:

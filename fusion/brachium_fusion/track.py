@@ -7,6 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from brachium_body import rotation
+from brachium_fusion.calibrated import Calibrated
 from brachium_fusion.orientation import FilterName, OrientationFilter, make
 from brachium_fusion.timeline import Block, Timeline
 from brachium_wire.codec import Drop
@@ -53,14 +54,7 @@ class SegmentTrack:
         """How often the filter lost its heading by a long gap."""
         self.reboots = 0
         """How often the node began to number anew."""
-        cal = info.calibration
-        self._gyro_bias = None if cal.gyro_bias is None else np.array(cal.gyro_bias)
-        self._accel_bias = np.array(cal.accel_bias or (0.0, 0.0, 0.0))
-        self._accel_scale = np.array(cal.accel_scale or (1.0, 1.0, 1.0))
-        self._calibrate_acc = cal.accel_bias is not None or cal.accel_scale is not None
-        self._mag_offset = np.array(cal.mag_offset or (0.0, 0.0, 0.0))
-        self._mag_matrix = np.eye(3) if cal.mag_matrix is None else np.array(cal.mag_matrix)
-        self._calibrate_mag = cal.mag_offset is not None or cal.mag_matrix is not None
+        self._calibrated = Calibrated(info.calibration)
 
     def _new_filter(self) -> OrientationFilter:
         return make(self._filter_name, 1.0 / self.info.rate_hz, self.magnetometer)
@@ -101,13 +95,8 @@ class SegmentTrack:
     def _feed_inertial(self, samples: Samples, gap: int) -> None:
         assert samples.gyr is not None
         assert samples.acc is not None
-        gyr = samples.gyr if self._gyro_bias is None else samples.gyr - self._gyro_bias
-        acc = samples.acc
-        if self._calibrate_acc:
-            acc = (acc - self._accel_bias) * self._accel_scale
-        mag = samples.mag
-        if mag is not None and self._calibrate_mag:
-            mag = (mag - self._mag_offset) @ self._mag_matrix.T
+        gyr, acc = self._calibrated.gyr(samples.gyr), self._calibrated.acc(samples.acc)
+        mag = None if samples.mag is None else self._calibrated.mag(samples.mag)
         silence = samples.time_ns[0] - self.last_ns if self.timeline else 0
         kind: Quality | None = None
         period_ns = 1e9 / self.info.rate_hz

@@ -140,7 +140,7 @@ def expected_columns(sides) -> list[str]:
     for side in sides:
         end = f"_{side[0]}" if both else ""
         names += [f"{j}_{a}{end}" for j in ("shoulder", "elbow", "wrist", "hand") for a in "xyz"]
-        names += [f"shoulder_shift_{a}{end}" for a in "xyz"]
+        names += [f"shoulder_shift_{a}{end}" for a in ("x", "y", "z", "sd_x", "sd_y", "sd_z")]
         names += [
             c if c.startswith("trunk_") else c + end
             for c in COLUMNS

@@ -167,6 +167,8 @@ class Skeleton(Message, frozen=True, kw_only=True, tag="skeleton/1"):
     """Angles and positions that are not plainly measured, with their quality."""
     shoulder_shift: Vector | None = msgspec.field(name="shift", default=None)
     """Displacement of the shoulder from where it was in the pose, trunk axes, m."""
+    shoulder_shift_sd: Vector | None = msgspec.field(name="shiftsd", default=None)
+    """Its standard deviation along each axis, m, as the estimator states it."""
     received_ns: int | None = msgspec.field(name="rx", default=None)
     """Host time at which the gateway had the last sample that this skeleton needed."""
 
