@@ -328,7 +328,7 @@ def test_tokens_appear_and_vanish(connect: Connect, router: Any, until: Until) -
         until(lambda: len(seen) == 4, "the second token again")
     until(lambda: seen[3:] == [(second, True), (second, False)], "the token whose bus was closed")
     end()
-    assert watcher.alive(keys.services("gym", "*/*/alive")) == [first]
+    assert connect().alive(keys.services("gym", "*/*/alive")) == [first]
 
 
 def test_heart_shows_token_and_health(connect: Connect, until: Until) -> None:

@@ -331,7 +331,7 @@ class Bus:
         return end
 
     def alive(self, key_expression: str, timeout_s: float = 1.0) -> list[str]:
-        """Return the keys of the liveliness tokens that match now."""
+        """Return the keys of the tokens that match now; Zenoh may find none on a bus watching them."""
         replies = self._session.liveliness().get(keys.expression(key_expression), timeout=timeout_s)
         return [str(r.ok.key_expr) for r in replies if r.ok is not None]
 
