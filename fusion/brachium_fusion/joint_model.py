@@ -1,0 +1,231 @@
+"""Two sensors on one joint: what both know of the joint centre's motion, as one error state. Pure.
+
+Each sensor is a strapdown system of its own: attitude and velocity by its gyroscope and accelerometer. The
+joint centre belongs to both segments, so the two velocities found for it must be one, and its mean over
+seconds must be small. That gives tilt, the heading between the sensors, gyroscope and accelerometer biases
+and the lever arms, without a magnetometer. Where the joint's axes are known they hold too.
+
+Being a velocity constraint, it needs no angular acceleration: integrated over an interval, the lever arm's
+part is the difference of R (w x r) at its ends. (Kok, Hol and Schoen 2014 and Weygers and Kok 2020 use
+accelerations.)
+
+Error state, 15 per sensor, a then b: attitude (world axes, rad), velocity of the sensor (world, m/s),
+gyroscope bias (rad/s), accelerometer bias (m/s^2), lever arm (m); attitude_true = exp(error) attitude.
+"""
+
+from dataclasses import dataclass
+from math import pi, radians
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from brachium_body import rotation
+
+Floats = npt.NDArray[np.float64]
+
+NODE_S = 0.08
+"""Constraints are applied this often: twice as often as the arm's fastest movements need."""
+TILT_SD = radians(3.0)
+GYRO_BIAS_SD = radians(0.5)
+"""Left after calibration, or after switching on in another temperature."""
+ACC_BIAS_SD = 0.15
+"""m/s^2: 15 mg, zero-g offset of a consumer accelerometer after soldering and calibration at another time."""
+LEVER_SD = 0.01
+"""m: a measured lever arm; the chip lies a few mm from the middle of its case."""
+UNKNOWN_LEVER_SD = 0.15
+SPEED_SD = 0.5
+"""m/s of the joint centre over time."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Joint:
+    """What is known of a joint between sensor a (proximal) and sensor b (distal)."""
+
+    axes: int
+    """1 hinge, 2 two axes as an elbow with pronation, 3 ball joint."""
+    axis_a: Floats | None = None
+    """(3,) the axis fixed in a's segment (elbow: flexion), in sensor a's axes; None: unknown."""
+    axis_b: Floats | None = None
+    """(3,) the axis fixed in b's segment (elbow: pronation; hinge: the same axis), in sensor b's axes."""
+    lever_a: Floats | None = None
+    """(3,) m, from sensor a to the joint centre in a's axes; None: unknown."""
+    lever_b: Floats | None = None
+    """(3,) m, from sensor b to the joint centre in b's axes."""
+    carrying_rad: float = 0.0
+    """For two axes: a's axis and b's enclose 90 deg less this."""
+
+    def __post_init__(self) -> None:
+        """Raise ValueError for what is no joint."""
+        if self.axes not in (1, 2, 3):
+            raise ValueError(f"a joint has 1, 2 or 3 axes, not {self.axes}")
+        for name in ("axis_a", "axis_b", "lever_a", "lever_b"):
+            vector = getattr(self, name)
+            if vector is not None and (np.shape(vector) != (3,) or not np.isfinite(vector).all()):
+                raise ValueError(f"{name}: expected three numbers, came {vector!r}")
+
+    @property
+    def has_axes(self) -> bool:
+        """Both axes are known and constrain the joint."""
+        return self.axes < 3 and self.axis_a is not None and self.axis_b is not None
+
+    @property
+    def has_levers(self) -> bool:
+        """Both lever arms are known."""
+        return self.lever_a is not None and self.lever_b is not None
+
+
+@dataclass(slots=True, eq=False)
+class Interval:
+    """Samples of both sensors gathered between two nodes, in each sensor's axes at its beginning. The arrays
+    may have further leading axes: many intervals, gathered at once."""
+
+    turn: Floats
+    """(..., 2, 4) start_from_end by the gyroscopes as they read."""
+    spread: Floats
+    """(..., 2, 3, 3) s: the integral of start_from_now."""
+    push: Floats
+    """(..., 2, 3) m/s: the integral of start_from_now times the specific force."""
+    squared: Floats
+    """(...) rad^2/s: the integral of the faster sensor's squared rate."""
+    span_s: float
+
+    @staticmethod
+    def empty(*shape: int) -> "Interval":
+        """Return intervals without samples."""
+        turn = np.zeros((*shape, 2, 4))
+        turn[..., 0] = 1.0
+        return Interval(turn, np.zeros((*shape, 2, 3, 3)), np.zeros((*shape, 2, 3)), np.zeros(shape), 0.0)
+
+    def extend(self, gyr: Floats, acc: Floats, period_s: float) -> None:
+        """Take the mean rates and specific forces (..., 2, 3) over the next period."""
+        half = rotation.from_rotation_vector(0.5 * period_s * gyr)
+        middle = rotation.multiply(self.turn, half)
+        matrix = rotation.to_matrix(middle)
+        self.spread = self.spread + matrix * period_s
+        self.push = self.push + (matrix @ acc[..., None])[..., 0] * period_s
+        self.turn = rotation.multiply(middle, half)
+        self.squared = self.squared + np.einsum("...i,...i->...", gyr, gyr).max(axis=-1) * period_s
+        self.span_s += period_s
+
+    def at(self, index: int | slice) -> "Interval":
+        """Return one of many intervals, or some."""
+        return Interval(
+            self.turn[index], self.spread[index], self.push[index], self.squared[index], self.span_s
+        )
+
+    def state(self) -> list[Any]:
+        """Return all as plain values."""
+        return [*(array.tolist() for array in (self.turn, self.spread, self.push, self.squared)), self.span_s]
+
+    @staticmethod
+    def of(state: list[Any]) -> "Interval":
+        """Return the interval whose state this is."""
+        turn, spread, push, squared = (np.array(values) for values in state[:4])
+        return Interval(turn, spread, push, squared, state[4])
+
+
+@dataclass(slots=True, eq=False)
+class JointState:
+    """Both sensors' motion and errors, and their covariance."""
+
+    attitude: Floats
+    """(2, 4) world_from_sensor."""
+    velocity: Floats
+    """(2, 3) m/s of the sensors, in the world."""
+    gyro_bias: Floats
+    acc_bias: Floats
+    lever: Floats
+    covariance: Floats
+    """(30, 30)."""
+
+    def copy(self) -> "JointState":
+        """Return another with the same values."""
+        return JointState(*(array.copy() for array in self._arrays()))
+
+    def state(self) -> list[Any]:
+        """Return all as plain values."""
+        return [array.tolist() for array in self._arrays()]
+
+    @staticmethod
+    def of(state: list[Any]) -> "JointState":
+        """Return what has this state."""
+        return JointState(*(np.array(values) for values in state))
+
+    def _arrays(self) -> tuple[Floats, ...]:
+        return self.attitude, self.velocity, self.gyro_bias, self.acc_bias, self.lever, self.covariance
+
+
+BLOCK = 15
+_LEARNT = np.concatenate([np.arange(6, BLOCK), np.arange(BLOCK + 6, 2 * BLOCK)])
+
+
+def begin(joint: Joint, attitude: Floats, gyr: Floats, heading_sd: float) -> JointState:
+    """Return the state at attitudes (2, 4), the heading between them known to `heading_sd` rad."""
+    lever = np.zeros((2, 3))
+    deviation = np.empty((2, BLOCK))
+    for i, known in enumerate((joint.lever_a, joint.lever_b)):
+        if known is not None:
+            lever[i] = known
+        deviation[i] = np.repeat(
+            [TILT_SD, SPEED_SD, GYRO_BIAS_SD, ACC_BIAS_SD, UNKNOWN_LEVER_SD if known is None else LEVER_SD], 3
+        )
+    deviation[0, 2], deviation[1, 2] = 1e-4, heading_sd
+    matrix = rotation.to_matrix(attitude)
+    velocity = -np.einsum("sij,sj->si", matrix, np.cross(gyr, lever))  # the joint centre rests
+    covariance = np.diag(deviation.ravel() ** 2)
+    return JointState(attitude.copy(), velocity, np.zeros((2, 3)), np.zeros((2, 3)), lever, covariance)
+
+
+def resume(joint: Joint, state: JointState, attitude: Floats, gyr: Floats, heading_sd: float) -> JointState:
+    """Return the state begun anew at attitudes (2, 4), with the biases and lever arms that were learnt."""
+    new = begin(joint, attitude, gyr, heading_sd)
+    kept = _LEARNT[:, None], _LEARNT[None, :]
+    new.covariance[kept] = state.covariance[kept]
+    new.gyro_bias, new.acc_bias = state.gyro_bias.copy(), state.acc_bias.copy()
+    new.lever = state.lever.copy()
+    return new
+
+
+def add(state: JointState, error: Floats) -> None:
+    """Put an error (30,) into the state."""
+    e = error.reshape(2, BLOCK)
+    turned = rotation.multiply(rotation.from_rotation_vector(e[:, 0:3]), state.attitude)
+    state.attitude = rotation.normalize(turned)
+    state.velocity = state.velocity + e[:, 3:6]
+    state.gyro_bias = state.gyro_bias + e[:, 6:9]
+    state.acc_bias = state.acc_bias + e[:, 9:12]
+    state.lever = state.lever + e[:, 12:15]
+
+
+def difference(to: JointState, of: JointState) -> Floats:
+    """Return the error (30,) that takes the state `of` to `to`."""
+    e = np.empty((2, BLOCK))
+    e[:, 0:3] = rotation.to_rotation_vector(rotation.multiply(to.attitude, rotation.inverse(of.attitude)))
+    e[:, 3:6] = to.velocity - of.velocity
+    e[:, 6:9] = to.gyro_bias - of.gyro_bias
+    e[:, 9:12] = to.acc_bias - of.acc_bias
+    e[:, 12:15] = to.lever - of.lever
+    return e.ravel()
+
+
+def attitude_after(attitude: Floats, gyro_bias: Floats, turn: Floats, spread: Floats) -> Floats:
+    """Return world_from_sensor (..., 2, 4) at the end of an interval that began at `attitude`."""
+    drift = (spread @ gyro_bias[..., None])[..., 0]
+    turned = rotation.multiply(rotation.from_rotation_vector(-drift), turn)
+    return rotation.normalize(rotation.multiply(attitude, turned))
+
+
+def in_given_world(attitude: Floats, given: Floats, shared: bool) -> tuple[Floats, Floats]:
+    """Return attitudes (..., 2, 4) with the common heading of the given ones (..., 2, 4), and by how much b's
+    given heading differs (...): the common heading is a's, or the mean of both where they share one."""
+    to_given = rotation.heading(rotation.multiply(given, rotation.inverse(attitude)))
+    heading = rotation.wrap(to_given[..., 0] - to_given[..., 1])
+    common = to_given[..., 0] - (0.5 * heading if shared else 0.0)
+    return rotation.multiply(rotation.about(2, common)[..., None, :], attitude), heading
+
+
+def heading_sd(covariance: Floats) -> float:
+    """Return the standard deviation of b's heading to a's, rad, at most pi."""
+    variance = covariance[2, 2] + covariance[17, 17] - 2.0 * covariance[2, 17]
+    return min(pi, float(np.sqrt(max(variance, 0.0))))
