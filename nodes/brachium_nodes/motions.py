@@ -4,11 +4,12 @@ Angles are anatomical (docs/conventions.md), so the same movement serves both ar
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from math import pi
 from typing import Protocol
 
 import numpy as np
+import numpy.typing as npt
 
 from brachium_body.lengths import ArmLengths
 from brachium_nodes.movement import Array, Variation, eased, minimum_jerk
@@ -38,6 +39,10 @@ class Build:
     lengths: ArmLengths
     carrying: float
     """The elbow's angle about X in rad, ISB's sign: valgus is negative."""
+    contracture_deg: float = 0.0
+    """The elbow does not straighten further; 0: it does."""
+    pose_error_deg: Mapping[str, float] = field(default_factory=dict[str, float])
+    """By how much each angle is off when this arm means to hold a pose."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -50,6 +55,21 @@ class Posture:
     def scaled(self, share: Array) -> "Posture":
         """Return the posture `share` (n,) of the way from neutral."""
         return Posture({k: v * share for k, v in self.angles.items()}, self.shift * share[:, None])
+
+    def turned(self, angles: Mapping[str, Array]) -> "Posture":
+        """Return the posture with angles (n,) rad more."""
+        return Posture({k: v + angles[k] if k in angles else v for k, v in self.angles.items()}, self.shift)
+
+    def added(self, other: "Posture", where: npt.NDArray[np.bool_]) -> "Posture":
+        """Return the sum with another posture, whose rows are the instants where `where` (n,) is true."""
+
+        def total(mine: Array, theirs: Array) -> Array:
+            result = mine.copy()
+            result[where] += theirs
+            return result
+
+        angles = {name: total(v, other.angles[name]) for name, v in self.angles.items()}
+        return Posture(angles, total(self.shift, other.shift))
 
 
 class Motion(Protocol):
@@ -73,6 +93,7 @@ class Keyframes:
 
     period_s: float
     frames: tuple[Frame, ...]
+    sway_deg: float = SHOULDER_SWAY_DEG
 
     def __call__(self, t: Array, variation: Variation, build: Build) -> Posture:  # noqa: ARG002 (any build does it)
         """Return the posture at times (n,) s."""
@@ -86,7 +107,7 @@ class Keyframes:
             values["shoulder_flexion"] = values["elevation"] * np.sin(plane)
             values["shoulder_abduction"] = values["elevation"] * np.cos(plane)
         for name in ANGLES[:3]:
-            values[name] = values[name] + SHOULDER_SWAY_DEG * variation.wander(name, t, 0.05, 0.4)
+            values[name] = values[name] + self.sway_deg * variation.wander(name, t, 0.05, 0.4)
         return posture(values)
 
     def _value(self, name: str, fraction: Array, extent: Array) -> Array:
@@ -116,27 +137,30 @@ def there_and_back(
 
 @dataclass(frozen=True, slots=True)
 class Free:
-    """Random daily movement within comfortable ranges (deg): it goes on for about 12 s, then pauses for 3."""
+    """Random daily movement within comfortable ranges (deg): of every 15 s the last `pause_s` are a pause."""
 
     ranges: Mapping[str, tuple[float, float]]
     shift_m: tuple[float, float, float]
     """Standard deviation of the shoulder's translation, by SHIFTS."""
+    pause_s: float = 3.0
+    fastest_hz: float = 0.45
 
     def __call__(self, t: Array, variation: Variation, build: Build) -> Posture:  # noqa: ARG002 (any build does it)
         """Return the posture at times (n,) s."""
         tau = self._active_time(t, variation)
         values: dict[str, Array] = {}
         for name, (low, high) in self.ranges.items():
-            reach = np.tanh(0.9 * variation.wander(name, tau, 0.03, 0.45))
+            reach = np.tanh(0.9 * variation.wander(name, tau, 0.03, self.fastest_hz))
             values[name] = 0.5 * (low + high) + 0.5 * (high - low) * reach
         for name, size in zip(SHIFTS, self.shift_m, strict=True):
             values[name] = size * variation.wander(name, tau, 0.03, 0.4)
         return posture(values)
 
-    @staticmethod
-    def _active_time(t: Array, variation: Variation) -> Array:
+    def _active_time(self, t: Array, variation: Variation) -> Array:
         """Return a time that stands still in the pauses; its pace rises and falls within 0.8 s."""
-        period, ramp, pause = 15.0, 0.8, 3.0
+        period, ramp, pause = 15.0, 0.8, self.pause_s
+        if not pause:
+            return t
         number, fraction = variation.repetitions(t, period)
         within = fraction * period
         return number * (period - pause) + eased(within, ramp) - eased(within - (period - pause), ramp)

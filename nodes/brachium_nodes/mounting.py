@@ -1,58 +1,28 @@
 """How a sensor is worn: where it sits, how far off it was put on, and how the skin moves it."""
 
 from dataclasses import dataclass
-from math import pi, sqrt
+from math import inf, pi, sqrt
 
 import numpy as np
 
 from brachium_body import rotation
-from brachium_body.lengths import ArmLengths
 from brachium_body.segments import Segment
 from brachium_nodes import tissue
-from brachium_nodes.movement import Array, minimum_jerk
+from brachium_nodes.magnetism import Surroundings
+from brachium_nodes.movement import Array, Variation, minimum_jerk
 from brachium_nodes.person import NEUTRAL_S, TRANSITION_S, Person
-from brachium_nodes.sensors import FIELD_UT, GRAVITY, Errors, generator
-from brachium_wire.messages import Quaternion, Vector
+from brachium_nodes.places import Place, place
+from brachium_nodes.sensors import GRAVITY, Errors, generator
+from brachium_nodes.wearing import TURNS, Wearing
+from brachium_wire.messages import Quaternion
 
 STEP_S = 0.001
 """Of the central differences that give acceleration and angular rate."""
+SLIP_S = 0.3
+"""How long a strap takes to slip."""
 
-
-@dataclass(frozen=True, slots=True)
-class Place:
-    """Where a sensor is worn."""
-
-    part: str
-    joint: str
-    """The joint it is measured from."""
-    lever: Vector
-    """m in segment axes (X forward, Y proximal, Z right), for a right arm."""
-    mounting: Quaternion
-    """Nominal segment_from_sensor."""
-
-
-_SAME: Quaternion = (1.0, 0.0, 0.0, 0.0)
-_HALF_TURN_ABOUT_Y: Quaternion = (0.0, 0.0, 1.0, 0.0)
-_FRONT: Quaternion = (sqrt(0.5), 0.0, sqrt(0.5), 0.0)
-
-
-def place(segment: Segment, lengths: ArmLengths) -> Place:
-    """Return where the sensor of a segment sits: on the outer side, y along the segment, z off the skin.
-
-    Upper arm: lateral, 4 cm above the epicondyle. Forearm: dorsal, 3 cm above the wrist. Hand: dorsal, on the
-    third metacarpal. Sternum: in front, 4 cm below the line of the shoulders.
-    """
-    if segment == "sternum":
-        return Place("sternum", "chest", (0.10, -0.04, 0.0), _FRONT)
-    part, side = segment[:-2], segment[-1]
-    along, off, joint = {
-        "upper_arm": (lengths.upper_arm - 0.04, 0.04, "shoulder"),
-        "forearm": (lengths.forearm - 0.03, 0.03, "elbow"),
-        "hand": (0.41 * lengths.hand, 0.02, "wrist"),
-    }[part]
-    if side == "r":
-        return Place(part, joint, (0.0, -along, off), _SAME)
-    return Place(part, joint, (0.0, -along, -off), _HALF_TURN_ABOUT_Y)
+DEFAULT_WEARING = Wearing()
+UNDISTURBED = Surroundings()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -60,28 +30,62 @@ class Worn:
     """One sensor on one person."""
 
     segment: Segment
+    """The segment that the node is named for."""
+    seat: Segment
+    """The segment that it sits on."""
+    nominal: Quaternion
+    """segment_from_sensor (4,) that the node's name stands for."""
     place: Place
     placement: Array
-    """segment_from_sensor as the strap was put on."""
+    """segment_from_sensor as the strap was put on; of the seat."""
     settling: Array
-    """Rotation vector (3,) rad, in sensor axes, by which it settles as the exercise begins."""
+    """Rotation vector (3,) rad, in sensor axes, by which it settles as movement begins."""
     tissue: Array
     """One rotation vector (3,) rad in segment axes for each neighbouring joint."""
+    lag: float
+    """Turn about the segment's Y over the angle of `tissue.LAGS`: how skin fails to follow rotation."""
+    slip: Array
+    """Rotation vector (3,) rad, in sensor axes, by which the strap slips."""
+    slip_s: float
+    """When it begins to slip."""
+    surroundings: Surroundings
+    seed: int
 
     @classmethod
-    def put_on(cls, segment: Segment, person: Person, errors: Errors) -> "Worn":
+    def put_on(
+        cls,
+        segment: Segment,
+        person: Person,
+        errors: Errors,
+        wearing: Wearing = DEFAULT_WEARING,
+        surroundings: Surroundings = UNDISTURBED,
+        slip_s: float = inf,
+    ) -> "Worn":
         """Return the sensor of this segment, its errors drawn from the person's seed."""
-        where = place(segment, person.lengths)
-        random = generator(person.settings.seed, segment, "strap")
+        seed, seat = person.settings.seed, wearing.seats.get(segment, segment)
+        where = place(seat, person.lengths, wearing.arrangement)
+        random = generator(seed, segment, "strap")
         off = rotation.from_rotation_vector(random_turn(errors.placement_deg, random))
         directions = random.standard_normal((len(tissue.NEIGHBOURS[where.part]), 3))
         unit = directions / np.linalg.norm(directions, axis=1, keepdims=True)
+        turned = np.array(TURNS[wearing.turned[segment]]) if segment in wearing.turned else rotation.IDENTITY
+        placement = rotation.multiply(rotation.multiply(where.mounting, turned), off)
+        outward = -1.0 if seat.endswith("_l") else 1.0
+        lag = {"upper_arm": errors.humeral_lag, "forearm": errors.pronation_lag}.get(where.part, 0.0)
+        slipping = generator(seed, segment, "slip").standard_normal(3)
         return cls(
             segment,
-            where,
-            placement=rotation.multiply(where.mounting, off),
+            seat,
+            nominal=place(segment, person.lengths, wearing.arrangement).mounting,
+            place=where,
+            placement=np.array(wearing.mounting[segment]) if segment in wearing.mounting else placement,
             settling=random_turn(errors.settling_deg, random),
             tissue=unit * (errors.soft_tissue_deg * pi / 180.0),
+            lag=-outward * lag,
+            slip=errors.slip_deg * pi / 180.0 * slipping / np.linalg.norm(slipping),
+            slip_s=slip_s,
+            surroundings=surroundings,
+            seed=seed,
         )
 
     def truth(self, t: Array, period_s: float, person: Person) -> tuple[Array, Array, Array]:
@@ -97,7 +101,7 @@ class Worn:
         return (
             rotation.rotate(sensor_from_world, _second_difference(p) - GRAVITY),
             turn / (2.0 * STEP_S),
-            rotation.rotate(sensor_from_world, FIELD_UT),
+            rotation.rotate(sensor_from_world, self._field(t, p[n : 2 * n], person)),
         )
 
     def pose(self, t: Array, person: Person, shift: Array | None = None) -> tuple[Array, Array]:
@@ -115,6 +119,8 @@ class Worn:
         if self.tissue.any():
             pulled = np.einsum("nj,ji->ni", tissue.pull(angles, self.place.part), self.tissue)
             skin = rotation.multiply(skin, rotation.from_rotation_vector(pulled))
+        if self.lag:
+            skin = rotation.multiply(skin, rotation.about(1, self.lag * angles[tissue.LAGS[self.place.part]]))
         point = joint + rotation.rotate(skin, place)
         if shift is not None:
             skin = rotation.multiply(skin, rotation.from_rotation_vector(tissue.tip(shift)))
@@ -123,14 +129,22 @@ class Worn:
         if self.settling.any():
             begun = minimum_jerk((t - NEUTRAL_S) / TRANSITION_S)
             q = rotation.multiply(q, rotation.from_rotation_vector(begun[:, None] * self.settling))
+        if self.slip_s < inf and self.slip.any():
+            gone = minimum_jerk((t - self.slip_s) / SLIP_S)
+            q = rotation.multiply(q, rotation.from_rotation_vector(gone[:, None] * self.slip))
         return q, point
+
+    def _field(self, t: Array, point: Array, person: Person) -> Array:
+        """Return the magnetic field (n, 3) uT, world axes, at the sensor's places (n, 3) m."""
+        chest = person.trunk(np.zeros(1)).chest
+        return self.surroundings.field_ut(t, point - chest, Variation(self.seed, self.segment))
 
     def _bone(self, t: Array, person: Person) -> tuple[Array, Array, dict[str, Array]]:
         """Return world_from_segment, the joint that the sensor is measured from, and the joint angles."""
-        if self.segment == "sternum":
+        if self.seat == "sternum":
             trunk = person.trunk(t)
             return trunk.world_from_thorax, trunk.chest, person.posture(t, person.moving_side).angles
-        arm = person.arm(t, "right" if self.segment.endswith("_r") else "left")
+        arm = person.arm(t, "right" if self.seat.endswith("_r") else "left")
         return arm.world_from[self.place.part], arm.joints[self.place.joint], arm.angles
 
     def _wobble(self, t: Array, period_s: float, person: Person) -> Array | None:

@@ -15,8 +15,11 @@ from brachium_body.kinematics import TRUNK_FROM_THORAX
 from brachium_body.lengths import ArmLengths, from_height
 from brachium_body.segments import ARM_PARTS, Side
 from brachium_nodes.exercises import EXERCISES
-from brachium_nodes.motions import DEG, Build, Posture
+from brachium_nodes.motions import ANGLES, DEG, Build, Posture
 from brachium_nodes.movement import Array, Variation, eased, minimum_jerk
+from brachium_nodes.routines import ROUTINES
+from brachium_nodes.script import Routine, Span
+from brachium_nodes.sensors import generator
 
 Arms = Literal["right", "left", "both"]
 
@@ -25,6 +28,9 @@ TRANSITION_S = 2.0
 
 CHEST_ABOVE_PELVIS = 0.25
 """Of body height: the arm of the trunk's sway."""
+
+TREMOR_HZ = (4.5, 5.5)
+TREMBLING = ("shoulder_flexion", "elbow_flexion", "forearm_pronation")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -37,7 +43,12 @@ class PersonSettings:
     seed: int = 0
     height_m: float = 1.80
     carrying_deg: float = 0.0
-    """Valgus of the elbow. 0 as in the arm model of Tsilomitrou 2021; people have about 8 (women more)."""
+    """Valgus of the elbow, varus negative. 0 as in the arm model of Tsilomitrou 2021; people have about 8
+    (women more)."""
+    contracture_deg: float = 0.0
+    """Elbow flexion at which the elbows stop when straightened; 0: they straighten."""
+    routine: str = ""
+    """What is done before the exercise: a routine of routines.ROUTINES, or nothing."""
     sway_deg: float = 0.0
     """Standard deviation of each of the trunk's three rotations while exercising; 0 is a back held still."""
 
@@ -49,10 +60,14 @@ class PersonSettings:
             raise ValueError(f"arms {self.arms!r} is not known; choose right, left or both")
         if not 1.4 <= self.height_m <= 2.3:
             raise ValueError(f"height {self.height_m} m cannot be used; give 1.4 to 2.3 m")
-        if not 0.0 <= self.carrying_deg <= 30.0:
+        if not -15.0 <= self.carrying_deg <= 30.0:
             raise ValueError(
-                f"carrying angle {self.carrying_deg} deg cannot be used; give 0 to 30 deg valgus"
+                f"carrying angle {self.carrying_deg} deg cannot be used; give -15 (varus) to 30 deg (valgus)"
             )
+        if not 0.0 <= self.contracture_deg <= 80.0:
+            raise ValueError(f"contracture {self.contracture_deg} deg cannot be used; give 0 to 80 deg")
+        if self.routine and self.routine not in ROUTINES:
+            raise ValueError(f"routine {self.routine!r} is not known; choose one of {', '.join(ROUTINES)}")
         if not 0.0 <= self.sway_deg <= 20.0:
             raise ValueError(f"sway {self.sway_deg} deg cannot be used; give 0 to 20 deg")
 
@@ -88,6 +103,10 @@ class Person:
     """A moving person; every method is a pure function of true time in s."""
 
     settings: PersonSettings
+    pose_error_deg: float = 0.0
+    """As sensors.Errors has it."""
+    tremor_deg: float = 0.0
+    """As sensors.Errors has it."""
 
     @cached_property
     def lengths(self) -> ArmLengths:
@@ -101,12 +120,54 @@ class Person:
 
     def posture(self, t: Array, side: Side) -> Posture:
         """Return joint angles and shoulder translation at times (n,)."""
-        s = self.settings
-        build = Build(lengths=self.lengths, carrying=-s.carrying_deg * DEG)
+        s, build = self.settings, self.build(side)
         motion = EXERCISES[s.exercise].motion
-        exercising = eased(t - NEUTRAL_S - TRANSITION_S, rise_s=1.0)
+        exercising = eased(t - self.begins_s - TRANSITION_S, rise_s=1.0)
         moving = motion(exercising, Variation(s.seed, side), build)
-        return moving.scaled(self._begun(t) if s.arms in (side, "both") else np.zeros(len(t)))
+        active = s.arms in (side, "both")
+        share = self._begun(t) if active else np.zeros(len(t))
+        made, before = moving.scaled(share), share < 1.0
+        if before.any() and (self.pose_error_deg or s.routine):
+            first = self.routine if active else ROUTINES[""](build)
+            early = first(t[before] - NEUTRAL_S, Variation(s.seed, side), build)
+            made = made.added(early.scaled(1.0 - share[before]), before)
+        return self._impaired(made, t, side)
+
+    def build(self, side: Side) -> Build:
+        """Return what a movement must know of an arm."""
+        s = self.settings
+        return Build(
+            lengths=self.lengths,
+            carrying=-s.carrying_deg * DEG,
+            contracture_deg=s.contracture_deg,
+            pose_error_deg=pose_error(self.pose_error_deg, s.seed, side) if self.pose_error_deg else {},
+        )
+
+    @cached_property
+    def routine(self) -> Routine:
+        """What is done before the exercise."""
+        return ROUTINES[self.settings.routine](self.build(self.moving_side))
+
+    @property
+    def begins_s(self) -> float:
+        """When the way from neutral to the exercise's first posture begins."""
+        return NEUTRAL_S + self.routine.seconds
+
+    @property
+    def spans(self) -> tuple[Span, ...]:
+        """What is done when before the exercise, in true time; standing in neutral comes first."""
+        standing = Span("n-pose", 0.0, NEUTRAL_S)
+        return (standing, *(span.later(NEUTRAL_S) for span in self.routine.spans))
+
+    def _impaired(self, made: Posture, t: Array, side: Side) -> Posture:
+        """Return the posture with tremor, and with an elbow that does not straighten."""
+        if self.tremor_deg:
+            variation, size = Variation(self.settings.seed, side), self.tremor_deg * DEG
+            made = made.turned({n: size * variation.wander(f"tremor/{n}", t, *TREMOR_HZ) for n in TREMBLING})
+        if self.settings.contracture_deg:
+            elbow = at_least(made.angles["elbow_flexion"], self.settings.contracture_deg * DEG)
+            made = Posture({**made.angles, "elbow_flexion": elbow}, made.shift)
+        return made
 
     def trunk(self, t: Array) -> Trunk:
         """Return the thorax at times (n,): it turns about the middle of the pelvis."""
@@ -143,9 +204,26 @@ class Person:
             world_from[part], joints[joint] = q, end
         return Arm(world_from, joints, posture.angles, shift)
 
-    @staticmethod
-    def _begun(t: Array) -> Array:
-        return minimum_jerk((t - NEUTRAL_S) / TRANSITION_S)
+    def _begun(self, t: Array) -> Array:
+        return minimum_jerk((t - self.begins_s) / TRANSITION_S)
+
+
+def pose_error(size_deg: float, seed: int, side: Side) -> dict[str, float]:
+    """Return by how much one arm's angles are off in every pose that is meant, deg.
+
+    The upper arm is off by `size_deg` (3-D rms), and so is the forearm on it. No arm hangs into the trunk and
+    no elbow is stretched beyond straight, so abduction and elbow flexion are off to one side.
+    """
+    random = generator(seed, side, "pose")
+    off = size_deg * random.standard_normal(5) / np.sqrt([3.0, 3.0, 3.0, 2.0, 2.0])
+    named = dict(zip(ANGLES[:5], off.tolist(), strict=True))
+    return {**named, **{name: abs(named[name]) for name in ("shoulder_abduction", "elbow_flexion")}}
+
+
+def at_least(angle: Array, limit: float) -> Array:
+    """Return the angle, or the limit where it is less; within some 6 deg of it the way is a smooth curve."""
+    result: Array = 0.5 * (angle + limit + np.sqrt((angle - limit) ** 2 + (6.0 * DEG) ** 2))
+    return result
 
 
 def joint_turns(angles: dict[str, Array], carrying: float) -> tuple[Array, Array, Array]:

@@ -16,7 +16,7 @@ import numpy.typing as npt
 from brachium_nodes.movement import Array
 from brachium_wire.messages import SensorCalibration, Vector
 
-Level = Literal["exact", "ideal", "typical"]
+Level = Literal["exact", "ideal", "typical", "patient"]
 
 G = 9.81
 """Standard acceleration in this project, m/s^2."""
@@ -30,10 +30,11 @@ _DPS = pi / 180.0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Errors:
-    """Every figure of a sensor's errors: standard deviations per axis, drawn once a sensor from the seed.
+    """Every figure of what stands between the movement meant and the readings got.
 
-    Densities are the MPU-9150 product specification's (revision 4.3, sections 6.1 to 6.3), and raw errors lie
-    within what it allows; residuals are assumptions of this project for a calibration done by hand.
+    Figures of the chip are standard deviations per axis, drawn once a sensor from the seed. Densities are the
+    MPU-9150 product specification's (revision 4.3, sections 6.1 to 6.3), and raw errors lie within what it
+    allows; residuals are assumptions of this project for a calibration done by hand.
     """
 
     gyro_noise: float = 0.005 * _DPS
@@ -69,6 +70,17 @@ class Errors:
     """3-D rms of the angle by which the strap settles as movement begins, after the pose: nothing sees it."""
     soft_tissue_deg: float = 0.0
     """Angle by which skin turns against bone for 90 deg in a neighbouring joint; 0 in neutral."""
+    humeral_lag: float = 0.0
+    """Share of the humerus's axial rotation that the skin under the upper-arm sensor does not follow."""
+    pronation_lag: float = 0.0
+    """Share of pronation that the skin under the forearm sensor does not follow."""
+    slip_deg: float = 0.0
+    """Angle by which one strap of the wearer slips, once."""
+    pose_error_deg: float = 0.0
+    """3-D rms of the angle by which the upper arm, and by which the forearm on it, is held off neutral and
+    off every pose of a calibration."""
+    tremor_deg: float = 0.0
+    """Standard deviation of a 5 Hz tremor in each of shoulder flexion, elbow flexion and pronation."""
     quantised: bool = True
     """Round to the chip's steps and stop at its full scale."""
 
@@ -79,8 +91,19 @@ LEVELS: dict[Level, Errors] = {
     ),
     "ideal": Errors(),
     "typical": Errors(settling_deg=1.5, soft_tissue_deg=2.0),
+    "patient": Errors(
+        settling_deg=1.5,
+        soft_tissue_deg=2.0,
+        humeral_lag=0.3,
+        pronation_lag=0.1,
+        slip_deg=8.0,
+        pose_error_deg=5.0,
+        tremor_deg=0.05,
+    ),
 }
-"""exact: no error at all, for tests; ideal: a calibrated chip on a rigid body; typical: the same on skin."""
+"""exact: no error at all, for tests; ideal: a calibrated chip on a rigid body; typical: the same on skin;
+patient: a wearer who cannot stand in neutral, whose skin follows rotation in part, whose hand trembles by
+about 1 mm and one of whose straps slips. The shares that skin follows are assumptions of this project."""
 
 ACCEL_FULL_SCALE = 8.0 * G
 """m/s^2; 4096 steps a g. A hand that hits the table passes 4 g."""

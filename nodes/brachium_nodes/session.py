@@ -15,6 +15,7 @@ from brachium_body.segments import SIDES, Segment, Side
 from brachium_nodes.motions import DEG
 from brachium_nodes.movement import Array
 from brachium_nodes.noise import Noise
+from brachium_nodes.script import Span
 from brachium_nodes.sensors import calibrated
 from brachium_nodes.truth import Truth
 from brachium_nodes.wearer import Wearer, WearerSettings
@@ -38,7 +39,7 @@ class SensorArrays:
     world_from_sensor: Array
     """(n, 4), with skin, strap and slip, without the skin's wobble."""
     segment_from_sensor: Array
-    """(n, 4): the mounting as it really is at each instant."""
+    """(n, 4): the mounting as it really is at each instant, on the segment that the sensor really sits on."""
     levers: dict[str, Array]
     """From the sensor to each joint of its segment (3,) m in sensor axes as put
     on; the sternum's to the chest, shoulder_r and shoulder_l of a person with still girdle."""
@@ -70,6 +71,10 @@ class SessionArrays:
     time_s: Array
     """(n,) true time: 0 is the beginning of standing in neutral."""
     lengths: ArmLengths
+    spans: tuple[Span, ...]
+    """What is done when before the exercise, in true time whatever the arrays' own span is."""
+    slip: tuple[Segment, float] | None
+    """Which strap slips, and when in s."""
     carrying: float
     """rad, ISB's sign: valgus negative."""
     sensors: dict[Segment, SensorArrays]
@@ -88,14 +93,17 @@ def session_arrays(
         raise ValueError(f"no samples lie between {from_s} and {to_s} s; give times from 0 on, in order")
     wearer, t = Wearer(settings), np.arange(first, end) / settings.rate_hz
     sides: tuple[Side, ...] = SIDES if settings.arms == "both" else (settings.arms,)
-    truths = {side: wearer.truth(t, side) for side in sides}
+    truths: dict[Side, Truth] = {side: wearer.truth(t, side) for side in sides}
+    arms: dict[Side, ArmArrays] = {side: _arm(wearer, t, truth) for side, truth in truths.items()}
     return SessionArrays(
         settings=settings,
         time_s=t,
         lengths=replace(wearer.person.lengths, relative_sd=0.0),
+        spans=wearer.person.spans,
+        slip=wearer.slip,
         carrying=-settings.carrying_deg * DEG,
         sensors={s: _sensor(wearer, s, first, t, truths, raw=raw) for s in wearer.segments},
-        arms={side: _arm(wearer, t, truth) for side, truth in truths.items()},
+        arms=arms,
     )
 
 
@@ -109,22 +117,22 @@ def _sensor(
     if not raw:
         acc, gyr, mag = calibrated(chip.calibration, acc, gyr, mag)
     told = [truth for truth in truths.values() if segment in truth.world_from_sensor]
-    truth = told[0] if told else wearer.truth(t, "right" if segment.endswith("_r") else "left")
+    truth = told[0] if told else wearer.truth(t, "right" if strap.seat.endswith("_r") else "left")
     world_from_sensor = truth.world_from_sensor[segment]
     sensor_from_segment = rotation.inverse(strap.placement)
     return SensorArrays(
         gyr=gyr,
         acc=acc,
         mag=mag,
-        nominal_mounting=np.array(strap.place.mounting),
+        nominal_mounting=np.array(strap.nominal),
         calibration=chip.calibration,
         world_from_sensor=world_from_sensor,
         segment_from_sensor=rotation.multiply(
-            rotation.inverse(truth.world_from_segment[segment]), world_from_sensor
+            rotation.inverse(truth.world_from_segment[strap.seat]), world_from_sensor
         ),
         levers={
             joint: rotation.rotate(sensor_from_segment, at - np.array(strap.place.lever))
-            for joint, at in _joints(segment, wearer.person.lengths).items()
+            for joint, at in _joints(strap.seat, wearer.person.lengths).items()
         },
     )
 

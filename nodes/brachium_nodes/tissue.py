@@ -17,6 +17,9 @@ NEIGHBOURS: dict[str, tuple[str, ...]] = {
 }
 """Joints whose movement pulls the skin of a part."""
 
+LAGS: dict[str, str] = {"upper_arm": "shoulder_rotation", "forearm": "forearm_pronation"}
+"""The rotation about a part's own length that its skin follows in part."""
+
 WOBBLE_HZ = 7.0
 DAMPING = 0.3
 """Of the sensor on its skin, as a mass on a damped spring; assumptions of this project."""

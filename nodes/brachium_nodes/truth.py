@@ -25,7 +25,7 @@ class Truth:
     world_from_segment: dict[str, Array]
     """By segment, with the sternum: (n, 4)."""
     world_from_sensor: dict[str, Array]
-    """By segment with a sensor: (n, 4), without the skin's wobble."""
+    """By the node's name, of those that sit on this arm or the chest: (n, 4), without the skin's wobble."""
     positions: dict[str, Array]
     """shoulder, elbow, wrist, hand in trunk axes from the chest: (n, 3) m."""
     angles: Array
@@ -53,16 +53,18 @@ def arm_truth(person: Person, worn: Mapping[Segment, Worn], t: Array, side: Side
         chest_to_shoulder=person.lengths.chest_to_shoulder,
     )
 
-    def sensor(on: Worn, bone: Array) -> Array:
-        if on.segment == "sternum":
-            return on.pose(t, person)[0]
-        return on.pose_on(bone, arm.joints[on.place.joint], arm.angles, t)[0]
-
     segments: tuple[Segment, ...] = ("sternum", *arm_segments(side))
+    bones: dict[str, Array] = dict(zip(segments, chain, strict=True))
+
+    def sensor(on: Worn) -> Array:
+        if on.seat == "sternum":
+            return on.pose(t, person)[0]
+        return on.pose_on(bones[on.seat], arm.joints[on.place.joint], arm.angles, t)[0]
+
     return Truth(
         trunk_from_world,
-        dict(zip(segments, chain, strict=True)),
-        {name: sensor(worn[name], q) for name, q in zip(segments, chain, strict=True) if name in worn},
+        bones,
+        {name: sensor(on) for seat in bones for name, on in worn.items() if on.seat == seat},
         {name: rotation.rotate(trunk_from_world, p - trunk.chest) for name, p in arm.joints.items()},
         angles,
         shoulder,

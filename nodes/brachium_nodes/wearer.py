@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 from heapq import merge
-from math import ceil
+from math import ceil, inf
 
 import numpy as np
 import numpy.typing as npt
@@ -17,12 +17,14 @@ import numpy.typing as npt
 from brachium_body.continuation import AngleTracker
 from brachium_body.segments import SEGMENTS, Segment, Side, arm_segments
 from brachium_nodes.link import EmulatedClock, FaultSettings, Injected, departures
-from brachium_nodes.mounting import Worn
+from brachium_nodes.magnetism import Surroundings
+from brachium_nodes.mounting import DEFAULT_WEARING, UNDISTURBED, Worn
 from brachium_nodes.movement import Array
 from brachium_nodes.noise import Noise
 from brachium_nodes.person import Person, PersonSettings
-from brachium_nodes.sensors import CHIP, LEVELS, Chip, Level
+from brachium_nodes.sensors import CHIP, LEVELS, Chip, Errors, Level, generator
 from brachium_nodes.truth import Truth, arm_truth, skeletons
+from brachium_nodes.wearing import Wearing
 from brachium_wire.messages import Quaternion, SensorCalibration, Skeleton
 
 
@@ -40,6 +42,10 @@ class WearerSettings(PersonSettings):
     """Which segments carry a sensor; empty: upper arm, forearm and hand of the exercising arms."""
     skew_ppm: float = 30.0
     """Standard deviation of the nodes' clock rates; crystals of this class are within 50 ppm."""
+    errors: Errors | None = None
+    """In place of the level's, as in `replace(LEVELS["typical"], placement_deg=15.0)`."""
+    wearing: Wearing = DEFAULT_WEARING
+    surroundings: Surroundings = UNDISTURBED
 
     def __post_init__(self) -> None:
         """Raise ValueError for what cannot be emulated."""
@@ -62,6 +68,13 @@ class WearerSettings(PersonSettings):
             return self.segments
         sides: tuple[Side, ...] = ("right", "left") if self.arms == "both" else (self.arms,)
         return tuple(segment for side in sides for segment in arm_segments(side))
+
+
+def slip_of(settings: WearerSettings) -> tuple[Segment, float]:
+    """Return the segment whose strap slips and the time in s at which it does."""
+    random, wearing = generator(settings.seed, "wearer", "slip"), settings.wearing
+    drawn, at = settings.worn()[int(random.integers(len(settings.worn())))], float(random.uniform(10.0, 40.0))
+    return wearing.slip_segment or drawn, at if wearing.slip_s is None else wearing.slip_s
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -115,11 +128,13 @@ class Wearer:
 
     def __init__(self, settings: WearerSettings) -> None:
         self.settings = settings
-        self.person = Person(settings)
-        self.segments = settings.worn()
-        seed, errors = settings.seed, LEVELS[settings.level]
+        seed, errors = settings.seed, settings.errors or LEVELS[settings.level]
         self.errors = errors
-        self.straps: dict[Segment, Worn] = {s: Worn.put_on(s, self.person, errors) for s in self.segments}
+        self.person = Person(settings, errors.pose_error_deg, errors.tremor_deg)
+        self.segments = settings.worn()
+        self.slip = slip_of(settings) if errors.slip_deg else None
+        """Which strap slips, and when in s."""
+        self.straps: dict[Segment, Worn] = {s: self._put_on(s) for s in self.segments}
         self.chips = {s: Chip.draw(errors, seed, s) for s in self.segments}
         self.clocks = {
             s: EmulatedClock.draw(settings.rate_hz, settings.skew_ppm, seed, s) for s in self.segments
@@ -133,9 +148,14 @@ class Wearer:
         return SensorInfo(
             chip=CHIP,
             rate_hz=self.settings.rate_hz,
-            mounting=self.straps[segment].place.mounting,
+            mounting=self.straps[segment].nominal,
             calibration=self.chips[segment].calibration,
         )
+
+    def _put_on(self, segment: Segment) -> Worn:
+        made, (slipping, slip_s) = self.settings, self.slip or (None, inf)
+        when = slip_s if segment == slipping else inf
+        return Worn.put_on(segment, self.person, self.errors, made.wearing, made.surroundings, when)
 
     def samples(self, segment: Segment, first: int, count: int) -> Readings:
         """Return `count` samples of a segment's sensor from number `first` on."""

@@ -211,7 +211,7 @@ def test_straps_are_put_on_some_degrees_off_and_settle_after_the_pose() -> None:
         bare = Errors(placement_deg=0.0)
         nominal = Worn.put_on("forearm_r", person, bare)
         if level == "typical":
-            worn = Worn(worn.segment, worn.place, nominal.placement, worn.settling, 0.0 * worn.tissue)
+            worn = replace(worn, placement=nominal.placement, tissue=0.0 * worn.tissue)
         at = np.array([t])
         return float(np.degrees(angle_between(worn.pose(at, person)[0], nominal.pose(at, person)[0]))[0])
 

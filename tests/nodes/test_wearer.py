@@ -195,7 +195,9 @@ def test_packets_of_all_sensors_come_in_order_of_time_and_hold_what_the_wire_tak
         {"batch": 0},
         {"mag_every": 0},
         {"segments": ("head",)},
-        {"carrying_deg": -8.0},
+        {"carrying_deg": -18.0},
+        {"contracture_deg": 120.0},
+        {"routine": "dancing"},
         {"sway_deg": 90.0},
     ],
 )
