@@ -1,0 +1,198 @@
+"""One window of a recording's shoulder: nominal movement, equations of its errors, their solution. Pure."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from brachium_body import rotation
+from brachium_fusion import shoulder_increments as si
+from brachium_fusion.shoulder_arrow import Chain, Solution
+from brachium_fusion.shoulder_equations import (
+    NO_TIES,
+    PLACE,
+    POSTURES,
+    SIZE,
+    SPEED,
+    TISSUE,
+    TURNS,
+    Stretch,
+    equations,
+)
+from brachium_fusion.shoulder_model import ArmModel, Bools, Floats, Sizes
+from brachium_fusion.shoulder_postures import Posture, Postures
+from brachium_fusion.shoulder_rest import rests
+from brachium_fusion.shoulder_tissue import Tissue
+
+PASSES = 3
+"""Of linearisation; the second knows how much the shoulder moves, and its rests."""
+SITS = slice(si.SITS_UPPER, si.CONSTANTS)
+LINEARISED = (np.arange(POSTURES) < si.CONSTANTS).astype(np.float64)
+"""The constants that the nominal movement is corrected by; those of the skin stay linear."""
+CAREFUL = 1.5
+"""Standard deviations are carried on larger by so much, for their correlations are not."""
+FORGET = 0.3
+"""Of what was not known at the start is unknown again a window later: biases walk, straps move."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Known:
+    """What is known at the first sample of a window, by its mean and standard deviation."""
+
+    world_from: Floats
+    """(2, 4)."""
+    knot: Floats
+    """(SIZE,) with the turns 0."""
+    knot_sd: Floats
+    constants: Floats
+    """(POSTURES,)."""
+    constants_sd: Floats
+    first_sd: Floats
+    """(POSTURES,) how they were known at the start of the recording."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Window:
+    """A solved window."""
+
+    solution: Solution
+    stretch: Stretch
+    constants: Floats
+    """(POSTURES,) what the last pass was linearised at."""
+    sensors: Floats
+    """(2, n, 4) nominal orientations."""
+    used: list[Posture]
+
+
+def solve(
+    model: ArmModel,
+    size: Sizes,
+    rate_hz: float,
+    data: list[Floats],
+    known: Known,
+    postures: Postures,
+    trunk_velocity: Floats | None,
+) -> Window:
+    """Return the solution of a window of samples `data`: gyr and acc of the upper arm's sensor, then of the
+    forearm's, (n, 3) each with n one more than whole intervals; rows of NaN are gaps."""
+    every, period = si.stride(rate_hz), 1.0 / rate_hz
+    step_s = every * period
+    filled, missing = _filled(data, every)
+    world, constants, shift = known.world_from, known.constants * LINEARISED, size.shift
+    place: Floats | None = None
+    for number in range(PASSES):
+        fitted = _fitted(model, constants)
+        errors = constants[: si.SITS_UPPER].reshape(2, 4, 3)
+        read = [si.Sensor(*filled[2 * i : 2 * i + 2], *errors[i]).corrected() for i in range(2)]
+        sensors = np.stack([si.strapdown(read[i][0], world[i], period) for i in range(2)])
+        inc = si.increments(
+            fitted, period, every, (sensors[0], *read[0]), (sensors[1], *read[1]), trunk_velocity
+        )
+        knots = sensors[:, ::every]
+        fastest = np.linalg.norm([r[0][::every] for r in read], axis=2).max(axis=0)
+        at_rest = rests(inc.velocity, step_s, fastest) & ~_beside(missing)
+        tissue = Tissue.at(fitted, knots[0], knots[1], postures.start)
+        stretch = Stretch(step_s, inc, knots[0], knots[1], read[0][0][::every], at_rest, missing, tissue)
+        ties, used = (NO_TIES, []) if place is None else postures.ties(knots, at_rest, step_s, place, size)
+        chain = equations(fitted, size, stretch, len(used), ties, shift)
+        _remember(chain, known, world, constants, used)
+        solution = chain.solve()
+        if number == PASSES - 1:
+            return Window(solution, stretch, constants, sensors, used)
+        constants = constants + solution.constants[:POSTURES] * LINEARISED
+        turn = solution.knots[0, TURNS].reshape(2, 3)
+        world = rotation.multiply(rotation.from_rotation_vector(turn), world)
+        place = solution.knots[:, PLACE]
+        shift = float(np.clip(np.sqrt(np.mean(place**2)), size.still, size.shift))
+    raise AssertionError("there is at least one pass")
+
+
+def _filled(data: list[Floats], every: int) -> tuple[list[Floats], Bools]:
+    """Return the samples with straight lines across gaps, and the intervals (k,) that touch one."""
+    bad: Bools = np.asarray(~np.isfinite(np.concatenate(data, axis=1)).all(axis=1))
+    both_ends = np.stack([bad[1:].reshape(-1, every), bad[:-1].reshape(-1, every)])
+    missing: Bools = np.asarray(both_ends.any(axis=(0, 2)))
+    if not bad.any():
+        return data, missing
+    rows, good = np.arange(len(bad)), np.flatnonzero(~bad)
+    if not len(good):
+        return [np.zeros_like(part) for part in data], missing
+    return [
+        np.stack([np.interp(rows, good, part[good, i]) for i in range(3)], axis=1) for part in data
+    ], missing
+
+
+def _beside(missing: Bools) -> Bools:
+    """Return the knots (k + 1,) at either end of the intervals (k,)."""
+    beside: Bools = np.concatenate([missing, [False]]) | np.concatenate([[False], missing])
+    return beside
+
+
+def _fitted(model: ArmModel, constants: Floats) -> ArmModel:
+    """Return the model with both sensors sitting as the constants say."""
+    upper, forearm = rotation.from_rotation_vector(constants[si.SITS_UPPER : si.CONSTANTS].reshape(2, 3))
+    return replace(
+        model,
+        sensor_from_upper_arm=rotation.multiply(upper, model.sensor_from_upper_arm),
+        sensor_from_forearm=rotation.multiply(forearm, model.sensor_from_forearm),
+        lever_upper=rotation.rotate(upper, model.lever_upper),
+        lever_forearm=rotation.rotate(forearm, model.lever_forearm),
+    )
+
+
+def _remember(chain: Chain, known: Known, world: Floats, constants: Floats, used: list[Posture]) -> None:
+    """Add what was known before to the equations of the errors of `world` and `constants`."""
+    turned = rotation.to_rotation_vector(rotation.multiply(known.world_from, rotation.inverse(world)))
+    value = known.knot + np.concatenate([np.zeros(6), turned.ravel()])
+    none = np.zeros((1, SIZE, len(chain.constants) - 1))
+    chain.add_at(np.array([0]), np.eye(SIZE)[None], none, value[None], known.knot_sd[None])
+    mean = np.concatenate([known.constants - constants * LINEARISED, *(p.place for p in used)])
+    weight = np.concatenate([known.constants_sd, *(p.sd for p in used)]) ** -2.0
+    index = np.arange(len(mean))
+    chain.constants[index, index] += weight
+    chain.constants[index, -1] += weight * mean
+
+
+def samples(window: Window, every: int, n: int) -> tuple[Floats, Floats, Floats, Bools]:
+    """Return displacement (n, 3), its sd (n, 3), orientations (2, n, 4) and rest (n,) at a window's samples:
+    cubic between knots for the displacement, straight for the errors of orientation."""
+    solution, stretch = window.solution, window.stretch
+    t = np.arange(n) / every
+    i = np.minimum(t.astype(np.int64), len(stretch.missing) - 1)
+    s = (t - i)[:, None]
+    a, b, h = solution.knots[i], solution.knots[i + 1], stretch.step_s
+    shift = (1.0 + 2.0 * s) * (1.0 - s) ** 2 * a[:, PLACE] + s * s * (3.0 - 2.0 * s) * b[:, PLACE]
+    shift += h * s * (1.0 - s) * ((1.0 - s) * a[:, SPEED] - s * b[:, SPEED])
+    sd = np.sqrt(np.einsum("kii->ki", solution.covariance[:, PLACE, PLACE]))
+    settled, left = window.constants[SITS].reshape(2, 3), solution.constants[SITS]
+    on_bone = left + stretch.tissue.turns(solution.constants[TISSUE])
+    error = np.concatenate([solution.knots[:, TURNS], on_bone], axis=1)
+    error = (1.0 - s) * error[i] + s * error[i + 1]
+    sensors = []
+    for j in range(2):
+        turn, sits = error[:, 3 * j : 3 * j + 3], error[:, 6 + 3 * j : 9 + 3 * j]
+        q = rotation.multiply(rotation.from_rotation_vector(turn), window.sensors[j, :n])
+        q = rotation.multiply(q, rotation.from_rotation_vector(sits))
+        sensors.append(rotation.multiply(q, rotation.from_rotation_vector(settled[j])))
+    nearest = np.minimum(np.rint(t).astype(np.int64), len(sd) - 1)
+    return shift, sd[nearest], np.stack(sensors), stretch.at_rest[nearest]
+
+
+def carried(window: Window, known: Known, knot: int, every: int, postures: Postures) -> Known:
+    """Return what a window makes of one of its knots, for the next to begin from; tell the postures."""
+    solution = window.solution
+    x, covariance = solution.knots[knot], solution.covariance[knot]
+    turn = rotation.from_rotation_vector(x[TURNS].reshape(2, 3))
+    constants = window.constants * LINEARISED + solution.constants[:POSTURES]
+    spread = np.sqrt(np.diag(solution.constants_covariance))
+    postures.learn(
+        window.used, solution.constants[POSTURES:].reshape(-1, 3), spread[POSTURES:].reshape(-1, 3)
+    )
+    sd = np.minimum(np.hypot(spread[:POSTURES], FORGET * known.first_sd), known.first_sd)
+    return Known(
+        rotation.multiply(turn, window.sensors[:, knot * every]),
+        np.concatenate([x[:6], np.zeros(6)]),
+        CAREFUL * np.sqrt(np.diag(covariance)),
+        constants,
+        sd,
+        known.first_sd,
+    )
