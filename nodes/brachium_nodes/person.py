@@ -49,6 +49,8 @@ class PersonSettings:
     """Elbow flexion at which the elbows stop when straightened; 0: they straighten."""
     routine: str = ""
     """What is done before the exercise: a routine of routines.ROUTINES, or nothing."""
+    extent: float = 1.0
+    """How far the exercise goes from neutral: 1 as it is described, 0 stands still."""
     sway_deg: float = 0.0
     """Standard deviation of each of the trunk's three rotations while exercising; 0 is a back held still."""
 
@@ -68,6 +70,8 @@ class PersonSettings:
             raise ValueError(f"contracture {self.contracture_deg} deg cannot be used; give 0 to 80 deg")
         if self.routine and self.routine not in ROUTINES:
             raise ValueError(f"routine {self.routine!r} is not known; choose one of {', '.join(ROUTINES)}")
+        if not 0.0 <= self.extent <= 1.2:
+            raise ValueError(f"extent {self.extent} cannot be used; give 0 to 1.2")
         if not 0.0 <= self.sway_deg <= 20.0:
             raise ValueError(f"sway {self.sway_deg} deg cannot be used; give 0 to 20 deg")
 
@@ -126,7 +130,7 @@ class Person:
         moving = motion(exercising, Variation(s.seed, side), build)
         active = s.arms in (side, "both")
         share = self._begun(t) if active else np.zeros(len(t))
-        made, before = moving.scaled(share), share < 1.0
+        made, before = moving.scaled(s.extent * share), share < 1.0
         if before.any() and (self.pose_error_deg or s.routine):
             first = self.routine if active else ROUTINES[""](build)
             early = first(t[before] - NEUTRAL_S, Variation(s.seed, side), build)

@@ -168,3 +168,16 @@ def test_minimum_jerk_starts_and_ends_at_rest_and_eased_is_its_integral() -> Non
         assert np.abs(np.diff(rate)).max() < 0.01
     integral = np.concatenate([[0.0], np.cumsum(0.5 * (step[1:] + step[:-1])) * 1e-4])
     assert np.abs(0.7 * integral - eased(0.7 * u, 0.7)).max() < 1e-8
+
+
+@pytest.mark.parametrize("extent", [0.0, 0.1, 1.0])
+def test_an_exercise_can_be_done_in_small(extent: float) -> None:
+    t = np.arange(SETTLED_S, 30.0, 0.02)
+    full, small = (
+        Person(PersonSettings(exercise="shrugging", extent=part)).posture(t, "right")
+        for part in (1.0, extent)
+    )
+    np.testing.assert_allclose(small.shift, extent * full.shift)
+    np.testing.assert_allclose(small.angles["elbow_flexion"], extent * full.angles["elbow_flexion"])
+    with pytest.raises(ValueError, match="give 0 to 1.2"):
+        PersonSettings(extent=2.0)
