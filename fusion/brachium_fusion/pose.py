@@ -14,6 +14,7 @@ import numpy.typing as npt
 from brachium_body import rotation
 from brachium_body.kinematics import TRUNK_FROM_NEUTRAL, joint_orientations
 from brachium_body.segments import SIDES, arm_segments, part_of, side_of
+from brachium_fusion.joint_alignment import JointAlignment
 from brachium_wire.messages import Forward
 
 Floats = npt.NDArray[np.float64]
@@ -54,6 +55,10 @@ class Alignment:
     scores: dict[str, float] = field(default_factory=dict)
     """Sway in the pose and turn from the nominal mounting, deg, per segment."""
     warnings: tuple[str, ...] = ()
+    joints: dict[str, JointAlignment] = field(default_factory=dict)
+    """What movement showed of `elbow_r`, `wrist_l` and so on."""
+    refused: dict[str, str] = field(default_factory=dict)
+    """What could not be found, and the reason."""
 
     def state(self) -> dict[str, Any]:
         """Return the alignment as plain values."""
@@ -65,6 +70,8 @@ class Alignment:
             "assumed": sorted(self.assumed),
             "scores": self.scores,
             "warnings": list(self.warnings),
+            "joints": {k: v.state() for k, v in self.joints.items()},
+            "refused": dict(self.refused),
         }
 
     @staticmethod
@@ -78,6 +85,8 @@ class Alignment:
             assumed=frozenset(state["assumed"]),
             scores=state["scores"],
             warnings=tuple(state["warnings"]),
+            joints={k: JointAlignment.from_state(v) for k, v in state.get("joints", {}).items()},
+            refused=dict(state.get("refused", {})),
         )
 
 
