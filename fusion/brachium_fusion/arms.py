@@ -18,8 +18,8 @@ from brachium_body.denavit_hartenberg import printed_angles
 from brachium_body.kinematics import TRUNK_FROM_THORAX, SegmentOrientations, between, positions
 from brachium_body.segments import SIDES, Side
 from brachium_fusion.rows import Row
+from brachium_fusion.settings import Settings
 from brachium_fusion.skeletons import messages
-from brachium_fusion.subject import Settings
 from brachium_fusion.timeline import Reading
 from brachium_wire.messages import Skeleton
 

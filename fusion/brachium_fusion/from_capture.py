@@ -10,8 +10,9 @@ from brachium_body import rotation
 from brachium_body.segments import Segment, part_of
 from brachium_fusion.pipeline import Pipeline
 from brachium_fusion.pose import Alignment
-from brachium_fusion.rows import check_session
-from brachium_fusion.subject import Settings, Subject
+from brachium_fusion.session_terms import check_session
+from brachium_fusion.settings import Settings
+from brachium_fusion.subject import Subject
 from brachium_wire.capture import Capture, CaptureSegment
 from brachium_wire.messages import Info, SensorCalibration, Session
 from brachium_wire.samples import Samples
@@ -135,6 +136,10 @@ def _start(capture: Capture) -> float:
 
 def _begin(subject: Subject, capture: Capture, instants: Sequence[int]) -> None:
     subject.session = session(capture)
+    subject.stated = {
+        name: (joint.axes, {s: np.array(v) for s, v in joint.centre_from.items()})
+        for name, joint in capture.settings.joint.items()
+    }
     subject.use_instants(instants)
     for segment, info in infos(capture).items():
         subject.inform(segment, info)

@@ -11,7 +11,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 
 from brachium_fusion.pipeline import Pipeline, Solved
-from brachium_fusion.subject import Change, Settings
+from brachium_fusion.settings import Change, Settings
 from brachium_wire import keys
 from brachium_wire.codec import WireError, decode_topic
 from brachium_wire.messages import Event, Skeleton, Snapshot

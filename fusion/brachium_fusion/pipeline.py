@@ -18,8 +18,10 @@ import msgspec
 
 from brachium_fusion.arms import Arms
 from brachium_fusion.pose_watch import checked_wish
-from brachium_fusion.rows import Row, check_session, rows_of
-from brachium_fusion.subject import Change, Settings, Subject
+from brachium_fusion.rows import Row, rows_of
+from brachium_fusion.session_terms import check_session
+from brachium_fusion.settings import Change, Settings
+from brachium_fusion.subject import Subject
 from brachium_wire import keys
 from brachium_wire.codec import WireError, decode_batch, decode_topic, encode
 from brachium_wire.messages import Calibration, Info, SampleBatch, Session, Skeleton, Snapshot

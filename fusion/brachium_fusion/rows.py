@@ -1,6 +1,5 @@
 """Rows: one arm at one instant each, with all that it is computed from. Pure."""
 
-from dataclasses import fields
 from math import radians
 from typing import NamedTuple
 
@@ -8,18 +7,16 @@ import numpy as np
 import numpy.typing as npt
 
 from brachium_body import rotation
-from brachium_body.assumptions import AS_STATED_BY_DEFAULT, StatedAngles
-from brachium_body.lengths import ArmLengths, from_measured
+from brachium_body.assumptions import StatedAngles
 from brachium_body.segments import SIDES, Side, arm_segments
 from brachium_fusion.pose import Alignment
+from brachium_fusion.session_terms import lengths_of, stated_angles
 from brachium_fusion.subject import Instant, Subject
 from brachium_fusion.timeline import Reading
 from brachium_wire.messages import Forward, Origin, Quality, Session
 
 Floats = npt.NDArray[np.float64]
 
-DEFAULT_HEIGHT_M = 1.75
-"""Used for lengths while nobody said how tall the subject is."""
 HEADING_SD_DEG = 2.0
 HEADING_DRIFT_DEG_S = 0.02
 """Heading without a magnetometer: uncertain by 2 deg after a pose, then by what a bias estimated at rests
@@ -141,7 +138,7 @@ def _frame(subject: Subject, instant: Instant, side: Side) -> Frame:
             ]
         ),
         turned=any(alignment.heading.values()),
-        stated=_stated(instant.session),
+        stated=stated_angles(instant.session),
         forward=alignment.forward,
         origin="emulated" if "emulated" in origins else "playback" if "playback" in origins else "worn",
         drifts=not any(t.magnetometer or t.info.orientation_only for t in tracks)
@@ -152,25 +149,7 @@ def _frame(subject: Subject, instant: Instant, side: Side) -> Frame:
     return frame
 
 
-def lengths_of(session: Session) -> ArmLengths:
-    """Return the arm lengths a session states, completed from height."""
-    return from_measured(session.lengths_m, session.height_m or DEFAULT_HEIGHT_M)
-
-
-def check_session(session: Session) -> None:
-    """Raise ValueError naming what of a session no arm has, or what nobody can use."""
-    lengths_of(session)
-    unknown = sorted(set(session.assumed_angles_deg) - {f.name for f in fields(StatedAngles)})
-    if unknown:
-        raise ValueError(f"assumed_angles_deg cannot use {unknown[0]!r}")
-
-
 def _facing(session: Session, subject: Subject) -> Floats:
     if session.facing_deg is None or not any(track.magnetometer for track in subject.tracks.values()):
         return rotation.IDENTITY
     return rotation.about(2, -radians(session.facing_deg))
-
-
-def _stated(session: Session) -> StatedAngles:
-    angles = {name: radians(value) for name, value in session.assumed_angles_deg.items()}
-    return StatedAngles(**angles) if angles else AS_STATED_BY_DEFAULT

@@ -13,7 +13,7 @@ import msgspec
 
 from brachium_fusion.pipeline import Pipeline
 from brachium_fusion.pose_watch import POSE_PATIENCE_S, STILL_S, checked_wish
-from brachium_fusion.subject import Change, Settings
+from brachium_fusion.settings import Change, Settings
 from brachium_wire import keys
 from brachium_wire.bus import DEFAULT_ENDPOINT, Bus, Inbox
 from brachium_wire.codec import Drop, WireError, decode, decode_topic, encode

@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 
 from brachium_fusion import from_capture, from_recording
-from brachium_fusion.orientation import AUTO, FilterName
+from brachium_fusion.orientation import FilterName
 from brachium_fusion.result import GROUPS, Group, tabulate
-from brachium_fusion.subject import Settings
+from brachium_fusion.settings import Settings
 from brachium_wire import capture as captures
 from brachium_wire import recording, table
 from brachium_wire.messages import Forward, Skeleton
@@ -166,7 +166,6 @@ def _finish(
 ) -> SolveReport:
     if not skeletons:
         raise SolveError(f"{settings.input}: no instant could be solved; is any segment of an arm in it?")
-    filter_name = AUTO if chosen.filter == "auto" else chosen.filter
     forward = skeletons[-1].forward
     if settings.out is not None:
         result = tabulate(skeletons, times_ns, times_s, settings.groups)
@@ -177,7 +176,7 @@ def _finish(
             {
                 "made_by": "brachium solve",
                 "input": settings.input.name,
-                "filter": filter_name,
+                "filter": chosen.filter,
                 "magnetometer": chosen.magnetometer,
                 "mode": "live",
                 "forward": forward,
@@ -194,7 +193,7 @@ def _finish(
     return SolveReport(
         rows=len({s.time_ns for s in skeletons}),
         sides=sorted({s.side for s in skeletons}),
-        filter=filter_name,
+        filter=chosen.filter,
         forward=forward,
         quality={segment: dict(counts) for segment, counts in quality.items()},
         drops=dict(drops),

@@ -6,7 +6,7 @@ changes stamped with the instant from which they hold. So a recording of them gi
 
 from collections import Counter, deque
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import msgspec
@@ -14,9 +14,12 @@ import numpy as np
 import numpy.typing as npt
 
 from brachium_body.segments import SEGMENTS, Side
-from brachium_fusion.orientation import FilterName
+from brachium_fusion.arm_knowledge import Centres
+from brachium_fusion.binding import Binding, Known
 from brachium_fusion.pose import Alignment, PoseName, PoseSensor, align, pose_orientations
 from brachium_fusion.pose_watch import HeldPose, PoseWatch, PoseWish
+from brachium_fusion.session_terms import lengths_of
+from brachium_fusion.settings import Change, Settings
 from brachium_fusion.timeline import Reading
 from brachium_fusion.track import SegmentTrack
 from brachium_wire.codec import Drop
@@ -33,32 +36,6 @@ HOST_GONE_NS = 2_000_000_000
 """Another host may take a subject over once the first was silent for this long."""
 WAITING_BATCHES = 64
 """Batches kept for a segment whose info has not come yet."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Settings:
-    """What one chooses of the pipeline."""
-
-    filter: FilterName = "auto"
-    magnetometer: bool = True
-    """False leaves magnetometers aside."""
-    rate_hz: float = 50.0
-    """Skeletons a second, on multiples of the period in host time."""
-    auto_pose: bool = True
-    """Take the first stillness of all sensors as the n-pose."""
-
-    def plain(self) -> dict[str, Any]:
-        """Return the settings as plain values: Settings(**plain) are the same."""
-        return asdict(self)
-
-
-class Change(NamedTuple):
-    """Something that is not a sample and holds from an instant on."""
-
-    from_ns: int
-    kind: str
-    """`session` or `calibrate`."""
-    data: dict[str, Any]
 
 
 class Instant(NamedTuple):
@@ -99,6 +76,9 @@ class Subject:
         self.drops: Counter[str] = Counter()
         self.revision = 0
         """Counts replacements of sensors, session and alignment."""
+        self.stated: Centres = {}
+        """What a capture says of joints."""
+        self.binding = Binding(settings.rate_hz)
         self.frames: dict[Side, object] = {}
         """Kept by arms.py for each arm between two calibrations; follows from the rest."""
 
@@ -204,6 +184,8 @@ class Subject:
     def use_instants(self, times_ns: Sequence[int]) -> None:
         """Solve at these instants instead of the grid."""
         self._times = deque(times_ns)
+        if len(times_ns) > 1:
+            self.binding.rate_hz = 1e9 / float(np.median(np.diff(times_ns)))
 
     def finish(self) -> None:
         """Nothing more will come: what was waited for is missing."""
@@ -228,6 +210,8 @@ class Subject:
             self._next_ns, self._done_ns = self._following(now), now
             self._apply_pending(now)
             self._watch_pose(now, readings)
+            if self._settings.binds:
+                readings = self.binding.correct(now, readings, self._known(), self.revision)
             yield Instant(
                 now,
                 readings,
@@ -288,6 +272,9 @@ class Subject:
         return max(
             now + self._period_ns, -(-min(begins) // self._period_ns) * self._period_ns if begins else 0
         )
+
+    def _known(self) -> Known:
+        return Known(self.alignment, lengths_of(self.session), self.stated, self.tracks)
 
     # -- changes and poses -------------------------------------------------------------------------------
 
@@ -375,6 +362,7 @@ class Subject:
             "alignment": None if self.alignment is None else self.alignment.state(),
             "reference_ns": self.reference_ns,
             "session": msgspec.to_builtins(self.session),
+            "binding": self.binding.state(self._known(), self.revision) if self._settings.binds else {},
         }
 
     def restore(self, state: dict[str, Any]) -> None:
@@ -400,6 +388,8 @@ class Subject:
         self.reference_ns = state["reference_ns"]
         self.session = msgspec.convert(state["session"], Session)
         self.revision += 1
+        if self._settings.binds:
+            self.binding.restore(state["binding"], self._known(), self.revision)
 
 
 _BLOCKS = ("acc", "gyr", "mag", "quat")

@@ -11,7 +11,7 @@ from brachium_fusion import from_recording
 from brachium_fusion.pipeline import Pipeline
 from brachium_fusion.solve import SolveError, SolveSettings
 from brachium_fusion.solve import run as solve
-from brachium_fusion.subject import Change, Settings
+from brachium_fusion.settings import Change, Settings
 from brachium_nodes.link import FaultSettings
 from brachium_nodes.wearer import Wearer, WearerSettings
 from brachium_wire import keys

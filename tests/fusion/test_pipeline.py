@@ -21,7 +21,7 @@ from brachium_body.kinematics import (
 from brachium_body.lengths import from_height
 from brachium_body.segments import arm_segments
 from brachium_fusion.pipeline import Pipeline
-from brachium_fusion.subject import Change, Settings
+from brachium_fusion.settings import Change, Settings
 from brachium_wire import keys
 from brachium_wire.codec import decode, decode_topic, encode
 from brachium_wire.messages import SampleBatch, Session, Skeleton, Snapshot

@@ -13,7 +13,7 @@ from brachium_body.kinematics import TRUNK_FROM_NEUTRAL
 from brachium_body.segments import arm_segments
 from brachium_fusion.pipeline import Pipeline
 from brachium_fusion.service import FuseSettings, run
-from brachium_fusion.subject import Settings
+from brachium_fusion.settings import Settings
 from brachium_wire import keys
 from brachium_wire.bus import Bus
 from brachium_wire.codec import decode, decode_topic, encode

@@ -27,7 +27,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Start fusion."""
     from brachium_fusion import service
-    from brachium_fusion.subject import Settings
+    from brachium_fusion.settings import Settings
 
     pipeline = Settings(
         filter=args.filter,

@@ -1,0 +1,100 @@
+"""What is known of one arm before it moves: its joints' axes and centres as its sensors see them. Pure."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from brachium_body import rotation
+from brachium_body.lengths import ArmLengths
+from brachium_body.segments import Side, arm_segments
+from brachium_fusion.joint_model import Joint
+from brachium_fusion.pose import Alignment
+
+Floats = npt.NDArray[np.float64]
+Centres = Mapping[str, tuple[int, Mapping[str, Floats]]]
+"""By joint: its axes, and its centre (3,) m from each segment's sensor, in sensor axes."""
+
+ABOVE_EPICONDYLE_M, ABOVE_WRIST_M = 0.04, 0.03
+"""Where sensors are worn as told: upper arm lateral, forearm dorsal, this far above the joint below."""
+OFF_UPPER_ARM_M, OFF_FOREARM_M, OFF_HAND_M = 0.04, 0.03, 0.02
+"""From the segment's middle line to the chip."""
+ON_HAND = 0.41
+"""Of the hand's length: the middle of the third metacarpal."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ArmKnowledge:
+    """One arm's joints, None where nothing binds their sensors."""
+
+    elbow: Joint | None = None
+    wrist: Joint | None = None
+
+    def plain(self) -> list[Any]:
+        """Return all of it as plain values that compare."""
+        return [None if joint is None else _plain(joint) for joint in (self.elbow, self.wrist)]
+
+
+def _plain(joint: Joint) -> list[Any]:
+    vectors = (joint.axis_a, joint.axis_b, joint.lever_a, joint.lever_b)
+    return [joint.axes, joint.carrying_rad, *(None if v is None else np.asarray(v).tolist() for v in vectors)]
+
+
+def arm_knowledge(
+    side: Side, alignment: Alignment | None, lengths: ArmLengths, stated: Centres
+) -> ArmKnowledge:
+    """Return what is known of an arm's joints: as stated, else as its alignment has them."""
+    upper, forearm, hand = arm_segments(side)
+    return ArmKnowledge(
+        elbow=_joint("elbow", upper, forearm, side, alignment, lengths, stated),
+        wrist=_joint("wrist", forearm, hand, side, alignment, lengths, stated),
+    )
+
+
+def _joint(
+    name: str,
+    a: str,
+    b: str,
+    side: Side,
+    alignment: Alignment | None,
+    lengths: ArmLengths,
+    stated: Centres,
+) -> Joint | None:
+    axes, centres = stated.get(name, (2, {}))
+    lever_a, lever_b = centres.get(a), centres.get(b)
+    aligned = alignment is not None and {a, b} <= alignment.mounting.keys() - alignment.assumed
+    if not aligned or alignment is None:
+        if lever_a is None or lever_b is None:
+            return None
+        return Joint(axes=axes, lever_a=lever_a, lever_b=lever_b)
+    from_a, from_b = (rotation.inverse(alignment.mounting[s]) for s in (a, b))
+    told_a, told_b = levers(name, side, lengths)
+    return Joint(
+        axes=axes,
+        axis_a=rotation.rotate(from_a, [0.0, 0.0, 1.0]),
+        axis_b=rotation.rotate(from_b, [0.0, 1.0, 0.0] if name == "elbow" else [1.0, 0.0, 0.0]),
+        lever_a=rotation.rotate(from_a, told_a) if lever_a is None else lever_a,
+        lever_b=rotation.rotate(from_b, told_b) if lever_b is None else lever_b,
+    )
+
+
+def places(side: Side, lengths: ArmLengths) -> tuple[Floats, Floats, Floats]:
+    """Return where the sensors of upper arm, forearm and hand are worn as told: (3,) m from the joint above,
+    in segment axes."""
+    out = 1.0 if side == "right" else -1.0
+    return (
+        np.array([0.0, ABOVE_EPICONDYLE_M - lengths.upper_arm, out * OFF_UPPER_ARM_M]),
+        np.array([0.0, ABOVE_WRIST_M - lengths.forearm, out * OFF_FOREARM_M]),
+        np.array([0.0, -ON_HAND * lengths.hand, out * OFF_HAND_M]),
+    )
+
+
+def levers(joint: str, side: Side, lengths: ArmLengths) -> tuple[Floats, Floats]:
+    """Return the way (3,) m from the sensor above a joint, and from the one below it, to its centre: in
+    segment axes, for sensors worn as told."""
+    upper, forearm, hand = places(side, lengths)
+    if joint == "elbow":
+        return np.array([0.0, -lengths.upper_arm, 0.0]) - upper, -forearm
+    return np.array([0.0, -lengths.forearm, 0.0]) - forearm, -hand

@@ -1,0 +1,30 @@
+"""What a session says of a person, in the terms of the arm's model. Pure."""
+
+from dataclasses import fields
+from math import radians
+
+from brachium_body.assumptions import AS_STATED_BY_DEFAULT, StatedAngles
+from brachium_body.lengths import ArmLengths, from_measured
+from brachium_wire.messages import Session
+
+DEFAULT_HEIGHT_M = 1.75
+"""Used for lengths while nobody said how tall the subject is."""
+
+
+def lengths_of(session: Session) -> ArmLengths:
+    """Return the arm lengths a session states, completed from height."""
+    return from_measured(session.lengths_m, session.height_m or DEFAULT_HEIGHT_M)
+
+
+def check_session(session: Session) -> None:
+    """Raise ValueError naming what of a session no arm has, or what nobody can use."""
+    lengths_of(session)
+    unknown = sorted(set(session.assumed_angles_deg) - {f.name for f in fields(StatedAngles)})
+    if unknown:
+        raise ValueError(f"assumed_angles_deg cannot use {unknown[0]!r}")
+
+
+def stated_angles(session: Session) -> StatedAngles:
+    """Return the angles of joints that no sensor sees, rad."""
+    angles = {name: radians(value) for name, value in session.assumed_angles_deg.items()}
+    return StatedAngles(**angles) if angles else AS_STATED_BY_DEFAULT
