@@ -1,7 +1,7 @@
 """The exercises of an emulated wearer. Angles in deg, shoulder translation in m."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from brachium_nodes.desk import OnDesk, circle, rectangle
 from brachium_nodes.motions import Free, Keyframes, Motion, there_and_back
@@ -41,6 +41,10 @@ _SIP = {**_MOUTH, "shoulder_abduction": 38, "forearm_pronation": 22, "wrist_devi
 _DRINK = ((0.0, _LAP), (0.14, _CUP), (0.22, _CUP), (0.42, _MOUTH), (0.48, _SIP), (0.56, _SIP), (0.62, _MOUTH),
           (0.78, _CUP), (0.84, _CUP), (0.96, _LAP), (1.0, _LAP))  # fmt: skip
 _HANGING = {"shoulder_flexion": 0.0, "shoulder_abduction": 0.0, "shoulder_rotation": 0.0}
+_LIFT = {"shift_up": 0.08, "shift_out": -0.012}
+_SHRUG = {**_LIFT, "shoulder_flexion": 2, "shoulder_abduction": 4, "elbow_flexion": 5}
+_HANGING_LOOSE = {"shoulder_flexion": 2, "shoulder_abduction": 6, "elbow_flexion": 12}
+_HANGING_LIFTED = {"shoulder_flexion": 4, "shoulder_abduction": 10, "elbow_flexion": 17}
 _STRAIGHT_WRIST = {"wrist_flexion": 0.0, "wrist_deviation": 0.0}
 
 EXERCISES: dict[str, Exercise] = {
@@ -119,18 +123,7 @@ EXERCISES: dict[str, Exercise] = {
         Exercise(
             name="shrugging",
             text="lift the shoulder by 8 cm and let it down, the arm hanging",
-            motion=there_and_back(
-                {"shoulder_flexion": 2, "shoulder_abduction": 6, "elbow_flexion": 12},
-                {
-                    "shift_up": 0.08,
-                    "shift_out": -0.012,
-                    "shoulder_flexion": 4,
-                    "shoulder_abduction": 10,
-                    "elbow_flexion": 17,
-                },
-                move=0.25,
-                hold=0.1,
-            ),
+            motion=there_and_back(_HANGING_LOOSE, {**_HANGING_LIFTED, **_LIFT}, move=0.25, hold=0.1),
             assumed_angles_deg={"forearm_pronation": 0.0, **_STRAIGHT_WRIST},
         ),
         Exercise(
@@ -187,6 +180,21 @@ EXERCISES: dict[str, Exercise] = {
             text="take a cup from the table, drink, put it back, rest the hand on the lap",
             motion=Keyframes(8.0, _DRINK),
         ),
+        Exercise(
+            name="shrugging-home",
+            text="lift the shoulder by 8 cm from neutral and let it down exactly to neutral, with rests",
+            motion=there_and_back({}, _SHRUG, move=0.25, hold=0.1, sway_deg=0.0),
+        ),
+        Exercise(
+            name="shrugging-continuous",
+            text="lift the shoulder by 8 cm and let it down every 2 s, without a rest",
+            motion=there_and_back(_HANGING_LOOSE, {**_HANGING_LIFTED, **_LIFT}, 2.0, move=0.5, hold=0.0),
+        ),
         Exercise(name="free", text="daily movement at random, with pauses", motion=_FREE),
+        Exercise(
+            name="free-continuous",
+            text="daily movement at random, without a pause",
+            motion=replace(_FREE, pause_s=0.0),
+        ),
     )
 }

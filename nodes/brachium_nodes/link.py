@@ -174,6 +174,28 @@ def departures(
             yield Departure(number, latest, done)
 
 
+def lost_samples(
+    count: int, batch: int, faults: FaultSettings, seed: int, segment: str
+) -> npt.NDArray[np.bool_]:
+    """Return which of a stream's first `count` samples (count,) are lost, sent `batch` at a time.
+
+    They are those that the same faults take from the stream itself, at any rate and without Wi-Fi's bursts.
+    """
+    packets = -(-count // batch)
+    lost = np.ones(packets, dtype=np.bool_)
+    for departure in departures(0.0, 1.0, batch, faults, seed, segment):
+        if departure.number < packets:
+            lost[departure.number] = False
+        elif departure.number > packets:  # a swapped packet comes after its successor, not later
+            return np.repeat(lost, batch)[:count]
+    raise AssertionError("departures never end")
+
+
+def burst_faults(share: float, packets: int = 5) -> FaultSettings:
+    """Return faults that lose this share of all packets, in bursts of `packets`."""
+    return FaultSettings(burst_loss=share / (packets - share * (packets - 1)), burst_packets=packets)
+
+
 def _draws(faults: FaultSettings, period_s: float, seed: int, segment: str) -> Iterator[tuple[float, str]]:
     """Yield delay in s and fate of one packet after the other."""
     wifi, random = WIFI[faults.wifi], generator(seed, segment, "link")

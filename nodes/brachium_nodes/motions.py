@@ -126,13 +126,13 @@ def there_and_back(
     period_s: float = 4.0,
     move: float = 0.42,
     hold: float = 0.08,
+    sway_deg: float = SHOULDER_SWAY_DEG,
 ) -> Keyframes:
     """Return repetitions from base to peak, a hold, back, and a rest; `move` and `hold` are fractions."""
     both = dict.fromkeys((*base, *peak), 0.0)
     low, high = {**both, **base}, {**both, **base, **peak}
-    return Keyframes(
-        period_s, ((0.0, low), (move, high), (move + hold, high), (2.0 * move + hold, low), (1.0, low))
-    )
+    frames = ((0.0, low), (move, high), (move + hold, high), (2.0 * move + hold, low), (1.0, low))
+    return Keyframes(period_s, frames, sway_deg)
 
 
 @dataclass(frozen=True, slots=True)

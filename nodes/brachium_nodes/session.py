@@ -4,7 +4,9 @@ All sensors are sampled at the same instants `k / rate_hz`: no clock skew, no pa
 drift are those of the same wearer's sample number k, so spans of one session agree where they overlap.
 """
 
+from collections.abc import Collection
 from dataclasses import dataclass, replace
+from typing import Literal, get_args
 
 import numpy as np
 
@@ -20,6 +22,9 @@ from brachium_nodes.sensors import calibrated
 from brachium_nodes.truth import Truth
 from brachium_nodes.wearer import Wearer, WearerSettings
 from brachium_wire.messages import SensorCalibration
+
+Reading = Literal["acc", "gyr", "mag"]
+READINGS: tuple[Reading, ...] = get_args(Reading)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -82,10 +87,11 @@ class SessionArrays:
 
 
 def session_arrays(
-    settings: WearerSettings, to_s: float, from_s: float = 0.0, *, raw: bool = False
+    settings: WearerSettings, to_s: float, from_s: float = 0.0, *, raw: bool | Collection[Reading] = False
 ) -> SessionArrays:
-    """Return the samples k / rate_hz in [from_s, to_s) and their truth; `raw` readings are uncalibrated.
+    """Return the samples k / rate_hz in [from_s, to_s) and their truth.
 
+    `raw` readings are uncalibrated: all of them, or those named.
     Raises ValueError for a span without samples.
     """
     first, end = round(from_s * settings.rate_hz), round(to_s * settings.rate_hz)
@@ -108,14 +114,21 @@ def session_arrays(
 
 
 def _sensor(
-    wearer: Wearer, segment: Segment, first: int, t: Array, truths: dict[Side, Truth], *, raw: bool
+    wearer: Wearer,
+    segment: Segment,
+    first: int,
+    t: Array,
+    truths: dict[Side, Truth],
+    *,
+    raw: bool | Collection[Reading],
 ) -> SensorArrays:
     strap, chip, made = wearer.straps[segment], wearer.chips[segment], wearer.settings
     white, drift = Noise(wearer.errors, made.seed, segment, made.rate_hz).span(first, len(t))
     true = strap.truth(t, 1.0 / made.rate_hz, wearer.person)
-    acc, gyr, mag = chip.read(*true, made.rate_hz, drift, white)
-    if not raw:
-        acc, gyr, mag = calibrated(chip.calibration, acc, gyr, mag)
+    read = chip.read(*true, made.rate_hz, drift, white)
+    left: Collection[Reading] = () if raw is False else READINGS if raw is True else raw
+    done = calibrated(chip.calibration, *read)
+    acc, gyr, mag = (r if name in left else c for name, r, c in zip(READINGS, read, done, strict=True))
     told = [truth for truth in truths.values() if segment in truth.world_from_sensor]
     truth = told[0] if told else wearer.truth(t, "right" if strap.seat.endswith("_r") else "left")
     world_from_sensor = truth.world_from_sensor[segment]

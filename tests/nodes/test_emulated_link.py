@@ -7,7 +7,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from brachium_nodes.link import WIFI, Departure, EmulatedClock, FaultSettings, departures
+from brachium_nodes.link import (
+    WIFI,
+    Departure,
+    EmulatedClock,
+    FaultSettings,
+    burst_faults,
+    departures,
+    lost_samples,
+)
 from brachium_wire.sequence import SequenceCounter
 
 SAMPLES = 5
@@ -130,3 +138,34 @@ def test_clocks_run_at_rates_of_their_own_and_tick_evenly() -> None:
 def test_impossible_faults_are_refused(wrong: dict[str, object]) -> None:
     with pytest.raises(ValueError, match=r"give|choose"):
         FaultSettings(**wrong)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("batch", [1, 5])
+def test_lost_samples_are_those_that_the_stream_loses(batch: int) -> None:
+    faults = FaultSettings(loss=0.1, burst_loss=0.02, burst_packets=5, swap=0.03, duplicate=0.02)
+    count = 997
+    lost = lost_samples(count, batch, faults, 4, "hand_r")
+    arrived = set()
+    for departure in departures(0.0, 1.0, batch, faults, 4, "hand_r"):
+        if departure.number > count:
+            break
+        arrived |= set(range(departure.number * batch, (departure.number + 1) * batch))
+    assert lost.shape == (count,)
+    assert set(np.flatnonzero(~lost)) == arrived & set(range(count))
+
+
+@pytest.mark.parametrize("share", [0.0, 0.05, 0.2])
+def test_bursts_lose_the_share_that_is_asked_for_in_runs(share: float) -> None:
+    lost = lost_samples(200_000, 1, burst_faults(share), 1, "hand_r")
+    assert lost.mean() == pytest.approx(share, rel=0.1)
+    if share:
+        edges = np.flatnonzero(np.diff(np.concatenate([[0], lost.astype(int), [0]])))
+        runs = edges[1::2] - edges[::2]
+        assert set(runs[:-1] % 5) == {0}
+
+
+def test_single_losses_have_the_share_that_is_asked_for() -> None:
+    assert lost_samples(100_000, 1, FaultSettings(loss=0.2), 2, "hand_r").mean() == pytest.approx(
+        0.2, rel=0.05
+    )
+    assert not lost_samples(1000, 3, FaultSettings(), 2, "hand_r").any()

@@ -2,9 +2,13 @@
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from brachium_body.rotation import angle_between, inverse, multiply, rotate
+from brachium_nodes.exercises import EXERCISES
+from brachium_nodes.routines import ROUTINES
 from brachium_nodes.sensors import GRAVITY
 from brachium_nodes.session import SessionArrays, session_arrays
 from brachium_nodes.wearer import Wearer, WearerSettings
@@ -42,8 +46,8 @@ def test_spans_of_one_session_agree_where_they_overlap() -> None:
 
 
 def test_a_session_is_the_stream_of_a_wearer_whose_clocks_are_right() -> None:
-    settings = made(level="ideal", skew_ppm=0.0)
-    s, wearer = session_arrays(settings, 4.0, raw=True), Wearer(settings)
+    stated = made(level="ideal", skew_ppm=0.0)
+    s, wearer = session_arrays(stated, 4.0, raw=True), Wearer(stated)
     for segment, sensor in s.sensors.items():  # standing still, the sampling instants do not matter
         stream = wearer.samples(segment, 0, 190)
         assert np.abs(sensor.acc[:190] - stream.acc).max() < 0.01
@@ -123,3 +127,63 @@ def test_half_an_hour_is_one_piece() -> None:
 def test_a_span_without_samples_is_refused(span: tuple[float, float]) -> None:
     with pytest.raises(ValueError, match=str(span[0])):
         session_arrays(made(), *span)
+
+
+def test_a_calibration_can_be_left_out_of_one_reading_alone() -> None:
+    raw, done = session_arrays(made(), 4.0, raw=True), session_arrays(made(), 4.0)
+    part = session_arrays(made(), 4.0, raw=("gyr",))
+    for segment, sensor in part.sensors.items():
+        assert np.array_equal(sensor.gyr, raw.sensors[segment].gyr)
+        assert np.array_equal(sensor.acc, done.sensors[segment].acc)
+        assert np.array_equal(sensor.mag, done.sensors[segment].mag)
+
+
+def test_shrugging_with_rests_comes_home_and_without_never_rests() -> None:
+    rests = session_arrays(made(exercise="shrugging-home", level="exact", rate_hz=25.0), 46.0, 6.0)
+    shift, speed = rests.arms["right"].shoulder_shift, np.linalg.norm(rests.sensors["hand_r"].gyr, axis=1)
+    home = np.linalg.norm(shift, axis=1) < 1e-12
+    assert 0.3 < home.mean() < 0.5
+    for name in ("shoulder_flexion", "shoulder_abduction", "elbow_flexion"):
+        assert np.abs(rests.arms["right"].angles[name][home]).max() < 1e-12
+    assert speed[home].max() < 1e-9
+    on = session_arrays(made(exercise="shrugging-continuous", level="exact", rate_hz=25.0), 46.0, 10.0)
+    up = on.arms["right"].shoulder_shift[:, 2]
+    assert np.ptp(up) == pytest.approx(0.08, rel=0.04)
+    assert 16 <= ((up[1:] > 0.04) & (up[:-1] <= 0.04)).sum() <= 20
+    assert (up < 0.002).mean() < 0.25
+
+
+def test_free_movement_can_go_on_without_a_pause() -> None:
+    s = session_arrays(made(exercise="free-continuous", level="exact"), 100.0, 8.0)
+    assert np.linalg.norm(s.sensors["hand_r"].gyr, axis=1).min() > 1e-3
+    assert s.arms["right"].shoulder_shift.std(axis=0) == pytest.approx([0.012, 0.02, 0.02], rel=0.3)
+
+
+@given(
+    level=st.sampled_from(["exact", "ideal", "typical", "patient"]),
+    routine=st.sampled_from(list(ROUTINES)),
+    exercise=st.sampled_from(list(EXERCISES)),
+    side=st.sampled_from(["right", "left"]),
+    seed=st.integers(0, 10_000),
+    carrying=st.sampled_from([-3.0, 0.0, 8.0, 15.0]),
+    contracture=st.sampled_from([0.0, 35.0]),
+)
+@settings(max_examples=30, deadline=None)
+def test_every_wearer_stands_still_at_first_and_is_told_truly(
+    level: str, routine: str, exercise: str, side: str, seed: int, carrying: float, contracture: float
+) -> None:
+    s = session_arrays(
+        made(level=level, routine=routine, exercise=exercise, arms=side, seed=seed, carrying_deg=carrying,
+             contracture_deg=contracture, rate_hz=25.0), 70.0,
+    )  # fmt: skip
+    arm = s.arms[side]  # type: ignore[index]
+    assert arm.angles["isb_carrying"] == pytest.approx(s.carrying, abs=1e-9)
+    assert np.degrees(arm.angles["elbow_flexion"]).min() > contracture - 15.0
+    joints = arm.trunk_positions
+    for near, far, part in (("shoulder", "elbow", "upper_arm"), ("elbow", "wrist", "forearm")):
+        length = np.linalg.norm(joints[far] - joints[near], axis=1)
+        assert length == pytest.approx(getattr(s.lengths, part))
+    for segment, sensor in s.sensors.items():
+        assert np.isfinite([sensor.gyr, sensor.acc, sensor.mag]).all()
+        standing = sensor.world_from_sensor[s.time_s < 4.0]
+        assert np.degrees(angle_between(standing, standing[0])).max() < 0.6, segment
