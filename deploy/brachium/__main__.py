@@ -16,6 +16,7 @@ COMMANDS: dict[str, str] = {
     "monitor": "the network in the terminal: nodes, rates, loss, latency",
     "solve": "a capture folder or a recording to angles, positions and orientations",
     "compare": "error statistics between two results",
+    "evaluate": "the accuracy tables: both papers' experiments, and real recordings",
     "doctor": "what works on this machine, what does not, and what to do",
     "bench": "the performance figures of this machine",
     "prove": "measure every figure that is promised, into a folder of JSON files",

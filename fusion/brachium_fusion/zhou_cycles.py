@@ -58,7 +58,7 @@ def cycle_reset(shift: Floats, cycles: list[int]) -> Floats:
     result: Floats = shift - shift[0]
     if not cycles:
         return result
-    edges = [0, *(c for c in cycles if c > 0)]
+    edges = [0, *(min(c, len(shift) - 1) for c in cycles if c > 0)]
     for begin, end in pairwise(edges):
         result[begin : end + 1] = shift[begin : end + 1] - _hermite(shift[begin : end + 1])
     last = edges[-1]

@@ -70,3 +70,8 @@ def test_lambda_of_unrelated_signals_explains_nothing():
 def test_one_repetition_is_too_few_for_lambda():
     with pytest.raises(ValueError, match="about 20; there are 1"):
         fit_lambda(np.zeros((100, 3)), np.zeros((100, 3)), [0, 99], RATE)
+
+
+def test_the_last_repetition_may_end_with_the_recording():
+    shift = np.random.default_rng(1).normal(size=(50, 3)).cumsum(axis=0)
+    np.testing.assert_allclose(cycle_reset(shift, [10, 30, 50]), cycle_reset(shift, [10, 30, 49]))

@@ -179,5 +179,5 @@ def test_an_exercise_can_be_done_in_small(extent: float) -> None:
     )
     np.testing.assert_allclose(small.shift, extent * full.shift)
     np.testing.assert_allclose(small.angles["elbow_flexion"], extent * full.angles["elbow_flexion"])
-    with pytest.raises(ValueError, match="give 0 to 1.2"):
+    with pytest.raises(ValueError, match=r"give 0 to 1\.2"):
         PersonSettings(extent=2.0)

@@ -1,0 +1,1 @@
+"""The accuracy tables: both papers' experiments on emulated wearers, and real recordings."""
