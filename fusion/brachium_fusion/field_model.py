@@ -89,10 +89,12 @@ def field_steps(levelled: Floats, gyr: Floats, mag: Floats, count: int) -> Field
 def looks(rate: Floats, step_s: float, apart_s: float) -> Floats:
     """Return how many independent looks at the field steps of `step_s` at mean rates (rad/s) are worth,
     one being worth `apart_s` of movement."""
-    return np.minimum(1.0, REST_SHARE + rate / INDEPENDENT_RAD) * (step_s / apart_s)
+    count: Floats = np.minimum(1.0, REST_SHARE + rate / INDEPENDENT_RAD) * (step_s / apart_s)
+    return count
 
 
 def heading_variance(rate: Floats, step_s: float) -> Floats:
     """Return the variance, rad^2, by which the heading of a frame without magnetometer drifts in a step."""
     moving = np.minimum(1.0, rate / MOVING_RAD_S)
-    return (HEADING_NOISE**2 * (REST_SHARE + moving) + (SCALE_NOISE * rate) ** 2) * step_s
+    variance: Floats = (HEADING_NOISE**2 * (REST_SHARE + moving) + (SCALE_NOISE * rate) ** 2) * step_s
+    return variance

@@ -88,6 +88,7 @@ def fit_heading(steps: FieldSteps, pieces: list[slice], step_s: float) -> Headin
     jacobian[:, :, 2:] = steps.response
     weight = sure / noise**2  # for the first change; then by the residuals
     residual = _residual(steps, offset, shared)
+    squared = np.einsum("ki,ki->k", residual, residual)
     for _ in range(MOST_STEPS):
         sine, cosine = np.sin(offset), np.cos(offset)
         jacobian[:, 0, 0], jacobian[:, 1, 0] = sine, cosine
@@ -143,7 +144,7 @@ def _solve(
     corner_right = flat_weighted.T @ residual.ravel() - prior * shared
     solved = solveh_banded(band, right, check_finite=False)
     coupled = right[:, 1:].T @ solved
-    shared_change = np.linalg.solve(corner - coupled[:, 1:], corner_right - coupled[:, 0])
+    shared_change: Floats = np.linalg.solve(corner - coupled[:, 1:], corner_right - coupled[:, 0])
     change: Floats = solved[:, 0] - solved[:, 1:] @ shared_change
     return change, shared_change
 

@@ -42,8 +42,7 @@ def smooth_orientation(gyr: Floats, acc: Floats, mag: Floats | None, rate_hz: fl
     """
     n = len(gyr)
     result = OfflineOrientation(np.full((n, 4), np.nan), np.zeros(n, dtype=np.bool_), np.full((n, 3), np.nan))
-    measured: Bools = ~np.isnan(np.concatenate([gyr, acc], axis=1)).any(axis=1)
-    pieces = _pieces(measured)
+    pieces = _pieces(np.isfinite(np.concatenate([gyr, acc], axis=1).sum(axis=1)))
     for piece in pieces:
         tilted = offlineVQF(
             np.ascontiguousarray(gyr[piece]), np.ascontiguousarray(acc[piece]), None, 1.0 / rate_hz

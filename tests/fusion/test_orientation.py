@@ -107,11 +107,11 @@ def test_a_magnetometer_that_is_left_aside_changes_nothing() -> None:
         assert np.array_equal(without, aside), name
 
 
-def test_auto_is_vqf() -> None:
+def test_auto_without_magnetometer_is_vqf() -> None:
     gyr, acc, mag = wandering()
     assert np.array_equal(
-        make("auto", 1.0 / RATE, True).update(gyr, acc, mag, None),
-        make("vqf", 1.0 / RATE, True).update(gyr, acc, mag, None),
+        make("auto", 1.0 / RATE, False).update(gyr, acc, mag, None),
+        make("vqf", 1.0 / RATE, False).update(gyr, acc, None, None),
     )
 
 
