@@ -131,11 +131,12 @@ class Person:
         active = s.arms in (side, "both")
         share = self._begun(t) if active else np.zeros(len(t))
         made, before = moving.scaled(s.extent * share), share < 1.0
+        first = self.routine if active else ROUTINES[""](build)
         if before.any() and (self.pose_error_deg or s.routine):
-            first = self.routine if active else ROUTINES[""](build)
             early = first(t[before] - NEUTRAL_S, Variation(s.seed, side), build)
             made = made.added(early.scaled(1.0 - share[before]), before)
-        return self._impaired(made, t, side)
+        held = first.held(t - NEUTRAL_S) * (1.0 - share) if self.tremor_deg else share
+        return self._impaired(made, t, side, 1.0 - held)
 
     def build(self, side: Side) -> Build:
         """Return what a movement must know of an arm."""
@@ -163,10 +164,11 @@ class Person:
         standing = Span("n-pose", 0.0, NEUTRAL_S)
         return (standing, *(span.later(NEUTRAL_S) for span in self.routine.spans))
 
-    def _impaired(self, made: Posture, t: Array, side: Side) -> Posture:
-        """Return the posture with tremor, and with an elbow that does not straighten."""
+    def _impaired(self, made: Posture, t: Array, side: Side, active: Array) -> Posture:
+        """Return the posture with tremor, as far as the arm is `active` (n,), and with an elbow that does not
+        straighten."""
         if self.tremor_deg:
-            variation, size = Variation(self.settings.seed, side), self.tremor_deg * DEG
+            variation, size = Variation(self.settings.seed, side), self.tremor_deg * DEG * active
             made = made.turned({n: size * variation.wander(f"tremor/{n}", t, *TREMOR_HZ) for n in TREMBLING})
         if self.settings.contracture_deg:
             elbow = at_least(made.angles["elbow_flexion"], self.settings.contracture_deg * DEG)

@@ -92,6 +92,14 @@ class Routine:
         mixed = _MIXED(t, variation, build).scaled(values["mixed"])
         return made.scaled(1.0 - values["mixed"]).added(mixed, everywhere)
 
+    def held(self, t: Array) -> Array:
+        """Return how far a pose is held at times (n,) s, 0 to 1."""
+        share = np.ones(len(t))
+        for move in self.moves:
+            if "posed" in move.change:
+                share += move.change["posed"] * minimum_jerk((t - move.from_s) / (move.to_s - move.from_s))
+        return share
+
 
 class Script:
     """A routine while it is written down."""

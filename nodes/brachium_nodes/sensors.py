@@ -80,7 +80,8 @@ class Errors:
     """3-D rms of the angle by which the upper arm, and by which the forearm on it, is held off neutral and
     off every pose of a calibration."""
     tremor_deg: float = 0.0
-    """Standard deviation of a 5 Hz tremor in each of shoulder flexion, elbow flexion and pronation."""
+    """Standard deviation of a 5 Hz tremor in each of shoulder flexion, elbow flexion and pronation. An arm
+    that holds a calibration's pose is relaxed and has none."""
     quantised: bool = True
     """Round to the chip's steps and stop at its full scale."""
 
@@ -98,12 +99,12 @@ LEVELS: dict[Level, Errors] = {
         pronation_lag=0.1,
         slip_deg=8.0,
         pose_error_deg=5.0,
-        tremor_deg=0.05,
+        tremor_deg=0.02,
     ),
 }
 """exact: no error at all, for tests; ideal: a calibrated chip on a rigid body; typical: the same on skin;
 patient: a wearer who cannot stand in neutral, whose skin follows rotation in part, whose hand trembles by
-about 1 mm and one of whose straps slips. The shares that skin follows are assumptions of this project."""
+some 0.3 mm and one of whose straps slips. The shares that skin follows are assumptions of this project."""
 
 ACCEL_FULL_SCALE = 8.0 * G
 """m/s^2; 4096 steps a g. A hand that hits the table passes 4 g."""
