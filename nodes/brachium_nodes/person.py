@@ -69,7 +69,9 @@ class PersonSettings:
         if not 0.0 <= self.contracture_deg <= 80.0:
             raise ValueError(f"contracture {self.contracture_deg} deg cannot be used; give 0 to 80 deg")
         if self.routine and self.routine not in ROUTINES:
-            raise ValueError(f"routine {self.routine!r} is not known; choose one of {', '.join(ROUTINES)}")
+            raise ValueError(
+                f"routine {self.routine!r} is not known; choose one of {', '.join(filter(None, ROUTINES))}"
+            )
         if not 0.0 <= self.extent <= 1.2:
             raise ValueError(f"extent {self.extent} cannot be used; give 0 to 1.2")
         if not 0.0 <= self.sway_deg <= 20.0:

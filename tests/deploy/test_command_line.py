@@ -133,6 +133,7 @@ BAD_INPUT = {
     "endpoint misspelt": (["monitor", "--endpoint", "foo"], "tcp/<host>:<port>"),
     "room of two words": (["fuse", "--room", "my room"], "room 'my room'"),
     "unknown exercise": (["emulate", "--exercise", "flying"], "choose one of"),
+    "unknown routine": (["emulate", "--routine", "dancing"], "choose one of calibration"),
     "nothing to play": (["play", "nothing"], "nothing"),
     "nothing to compare": (["compare", "a.csv", "b.csv"], "a.csv"),
 }

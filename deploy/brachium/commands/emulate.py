@@ -35,8 +35,11 @@ def configure(parser: argparse.ArgumentParser) -> None:
 def add_wearer(parser: argparse.ArgumentParser) -> None:
     """Add who moves, and with which sensors."""
     parser.add_argument("--exercise", default="elbow-flexion", help="what is done; an unknown name lists all")
+    parser.add_argument("--routine", default="", help="what is done first; an unknown name lists all")
     parser.add_argument("--arms", default="right", help="right, left or both")
-    parser.add_argument("--level", default="typical", help="sensor errors: exact (none), ideal, typical or patient")
+    parser.add_argument(
+        "--level", default="typical", help="sensor errors: exact (none), ideal, typical or patient"
+    )
     parser.add_argument("--seed", type=seed, default=1, help="of everything random")
     parser.add_argument("--rate", type=real(1.0, 1000.0), default=100.0, metavar="HZ", help="of the sensors")
     parser.add_argument("--batch", type=whole(1, 128), default=5, help="samples in a packet")
@@ -88,6 +91,7 @@ def settings(args: argparse.Namespace, token: str) -> "EmulateSettings":
         alike=not args.different,
         wearer=WearerSettings(
             exercise=args.exercise,
+            routine=args.routine,
             arms=args.arms,
             level=args.level,
             seed=args.seed,
