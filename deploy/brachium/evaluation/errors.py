@@ -5,7 +5,7 @@ Estimates hold NaN where nothing is known; such rows do not count, and `covered`
 
 from collections.abc import Sequence
 from itertools import pairwise
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -61,6 +61,13 @@ def eq17(estimate: Floats, reference: Floats) -> NormFigures | None:
     return NormFigures(float(apart.mean()), float(apart.max()), float(np.sqrt((apart**2).mean())))
 
 
+def _wilcoxon(means: Sequence[float]) -> float | None:
+    if len(means) <= 5 or not any(means):
+        return None
+    result: Any = stats.wilcoxon(means)
+    return float(result.pvalue)
+
+
 class CycleFigures(NamedTuple):
     """What Zhou's tables 1 to 5 state, in the error's unit: means over cycles and axes."""
 
@@ -99,5 +106,5 @@ def per_cycle(estimate: Floats, reference: Floats, cycles: Sequence[int]) -> Cyc
         float(np.mean(sds)),
         float(np.mean(rmss)),
         float(np.mean(correlations)) if correlations else None,
-        float(stats.wilcoxon(means).pvalue) if len(means) > 5 and any(means) else None,
+        _wilcoxon(means),
     )

@@ -65,8 +65,9 @@ class Trial:
 
     def stand_ins(self) -> dict[Segment, Segment]:
         """Return the nodes that carry the second set: by the segment that each sits on, its own name."""
-        free = [segment for segment in SEGMENTS if segment not in self.segments()]
-        return dict(zip(self.segments(), free, strict=False))
+        worn = self.segments()
+        free: list[Segment] = [segment for segment in SEGMENTS if segment not in worn]
+        return {seat: free[i] for i, seat in enumerate(worn)}
 
     def settings(self) -> WearerSettings:
         """Return the wearer."""
