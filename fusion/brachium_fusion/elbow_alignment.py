@@ -11,9 +11,10 @@ from brachium_body import rotation
 from brachium_body.segments import Side, arm_segments, suffix
 from brachium_fusion.joint_alignment import JointAlignment
 from brachium_fusion.joint_axes import FEWEST_ROWS, JointAxes, fit_joint_axes
-from brachium_fusion.joint_equations import AxisPriors
-from brachium_fusion.joint_motion import JointMotion, joint_motion
-from brachium_fusion.segment_frames import ElbowFrames, ElbowPose, elbow_frames, excursion_deg
+from brachium_fusion.joint_centre import JointCentre, find_joint_centre
+from brachium_fusion.joint_equations import AxisPriors, HeadingPrior
+from brachium_fusion.joint_motion import JointMotion, SensorMotion, joint_motion
+from brachium_fusion.segment_frames import ElbowFrames, ElbowPose, elbow_angles, elbow_frames, excursion_deg
 
 Floats = npt.NDArray[np.float64]
 
@@ -25,8 +26,14 @@ PARALLEL_DEG = 35.0
 """A carrying angle beyond this is no elbow's."""
 UNSURE_DEG = 15.0
 """An axis or heading that is not known better is told as a warning."""
-MERIT = 10.0
-"""Cost that agreement with gravity, range and mounting is worth where movement leaves a choice."""
+NEAR_S = 120.0
+"""The heading between sensors without magnetometers holds so long."""
+SHARED_SD = radians(20.0)
+"""Of the headings of two magnetometers in a room with iron in it."""
+CENTRE_SD = radians(1.5)
+"""What the joint that is no point adds to a heading from accelerations."""
+LEVER_SD_M = 0.03
+"""A joint's centre that is not known better is not told."""
 SHARE = 0.5
 """Of a functional movement that must be about its own axis."""
 
@@ -52,8 +59,8 @@ class ElbowFound:
 
 
 def find_elbow(
-    upper: Floats,
-    forearm: Floats,
+    upper: SensorMotion,
+    forearm: SensorMotion,
     pose: ElbowPose,
     spans: Sequence[tuple[str, int, int]],
     rate_hz: float,
@@ -63,7 +70,7 @@ def find_elbow(
     nominal_upper: Floats | None = None,
     nominal_forearm: Floats | None = None,
 ) -> ElbowFound | Refused:
-    """Return the elbow between sensors with orientations (n, 4), from spans (kind, first row, end row).
+    """Return the elbow between two sensors, from spans (kind, first row, end row).
 
     With `shared_heading` both have magnetometers: their worlds are believed to agree within 20 deg.
     """
@@ -73,6 +80,7 @@ def find_elbow(
         few = "too few samples of upper arm and forearm together in the spans: at least 2 s are needed"
         return Refused(reasons={f"elbow{end}": few})
     up = np.array([0.0, 0.0, 1.0])
+    centre = find_joint_centre(motion)
     solutions = fit_joint_axes(
         motion,
         AxisPriors(
@@ -81,20 +89,25 @@ def find_elbow(
             axis_b=_forearm_axis(pose, nominal_forearm),
             axis_b_sd=radians(12.0 if pose.hanging_forearm else 25.0),
             axis_a_sd=radians(25.0),
-            heading=0.0 if shared_heading else None,
+            heading=_heading_prior(centre, shared_heading),
         ),
     )
-    judged = [(f, elbow_frames(motion, f, pose, side, nominal_upper, nominal_forearm)) for f in solutions]
-    found, frames = min(judged, key=lambda pair: pair[0].cost - MERIT * pair[1].merit)
-    reason = _why_not(motion, found, frames, spans, rate_hz)
+    # the elbow's range shows in all that was recorded near the spans
+    margin, rows = round(NEAR_S * rate_hz), len(upper.world_from_sensor)
+    around = [(max(0, first - margin), min(rows, last + margin)) for _, first, last in spans]
+    seen = joint_motion(upper, forearm, around, rate_hz)
+    judged = [(f, elbow_frames(seen, f, pose, side, nominal_upper, nominal_forearm)) for f in solutions]
+    found, frames = min(judged, key=lambda pair: pair[0].cost - pair[1].merit)
+    flexion, pronation = elbow_angles(motion, found, frames, side)
+    bent, turned = excursion_deg(flexion), excursion_deg(pronation)
+    reason = _why_not(motion, found, frames, bent, spans, rate_hz)
     if reason is not None:
         return Refused(reasons={f"elbow{end}": reason})
     near, far, _ = arm_segments(side)
-    pronated = excursion_deg(frames.pronation)
     refused = {}
-    if pronated < LEAST_PRONATION_DEG:
+    if turned < LEAST_PRONATION_DEG:
         refused[f"pronation{end}"] = (
-            f"the forearm turned by {pronated:.0f} deg only, at least {LEAST_PRONATION_DEG:.0f} are needed: "
+            f"the forearm turned by {turned:.0f} deg only, at least {LEAST_PRONATION_DEG:.0f} are needed: "
             "its axis rests on gravity in the pose"
         )
     if degrees(found.heading_sd) > UNSURE_DEG and degrees(found.axis_a_sd) > UNSURE_DEG:
@@ -112,15 +125,35 @@ def find_elbow(
         axis_near_sd_rad=found.axis_a_sd,
         axis_far_sd_rad=found.axis_b_sd,
         heading_sd_rad=found.heading_sd,
+        lever_near_m=None if centre is None else _lever(centre.lever_a, centre.lever_a_sd),
+        lever_far_m=None if centre is None else _lever(centre.lever_b, centre.lever_b_sd),
     )
     return ElbowFound(
         joint=joint,
         upper_from_sensor=frames.upper_from_sensor,
         forearm_from_sensor=frames.forearm_from_sensor,
         axis_in_pose=rotation.rotate(pose.upper_sensor, frames.axis_upper),
-        scores=_scores(found, frames, end),
+        scores={
+            f"flexion_axis_deg{end}": degrees(found.axis_a_sd),
+            f"pronation_axis_deg{end}": degrees(found.axis_b_sd),
+            f"joint_heading_deg{end}": degrees(found.heading_sd),
+            f"carrying_deg{end}": degrees(-frames.carrying),
+            f"elbow_in_pose_deg{end}": degrees(frames.pose_flexion),
+            f"flexion_range_deg{end}": bent,
+            f"pronation_range_deg{end}": turned,
+            f"unexplained_share{end}": found.residual,
+        },
         refused=refused,
     )
+
+
+def _heading_prior(centre: JointCentre | None, shared: bool) -> HeadingPrior | None:
+    if centre is not None:
+        sd = np.hypot(centre.headings_sd, CENTRE_SD)
+        return HeadingPrior(time_s=centre.knots_s, heading=centre.headings, sd=sd)
+    if shared:
+        return HeadingPrior(time_s=np.zeros(1), heading=np.zeros(1), sd=np.full(1, SHARED_SD))
+    return None
 
 
 def _forearm_axis(pose: ElbowPose, nominal: Floats | None) -> Floats | None:
@@ -135,28 +168,19 @@ def _vector(v: Floats) -> tuple[float, float, float]:
     return (float(v[0]), float(v[1]), float(v[2]))
 
 
-def _scores(found: JointAxes, frames: ElbowFrames, end: str) -> dict[str, float]:
-    return {
-        f"flexion_axis_deg{end}": degrees(found.axis_a_sd),
-        f"pronation_axis_deg{end}": degrees(found.axis_b_sd),
-        f"joint_heading_deg{end}": degrees(found.heading_sd),
-        f"carrying_deg{end}": degrees(-frames.carrying),
-        f"elbow_in_pose_deg{end}": degrees(frames.pose_flexion),
-        f"flexion_range_deg{end}": excursion_deg(frames.flexion),
-        f"pronation_range_deg{end}": excursion_deg(frames.pronation),
-        f"unexplained_share{end}": found.residual,
-    }
+def _lever(lever: Floats, sd: Floats) -> tuple[float, float, float] | None:
+    return _vector(lever) if float(np.linalg.norm(sd)) < LEVER_SD_M else None
 
 
 def _why_not(
     motion: JointMotion,
     found: JointAxes,
     frames: ElbowFrames,
+    bent: float,
     spans: Sequence[tuple[str, int, int]],
     rate_hz: float,
 ) -> str | None:
     """Return why the elbow cannot be used, or None."""
-    bent = excursion_deg(frames.flexion)
     if bent < LEAST_FLEXION_DEG:
         upper = degrees(float(np.sum(np.linalg.norm(motion.rate_a, axis=1)) / 10.0))
         where = "; the shoulder moved instead" if upper > 180.0 else ""

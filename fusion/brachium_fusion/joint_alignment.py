@@ -27,6 +27,9 @@ class JointAlignment:
     axis_near_sd_rad: float
     axis_far_sd_rad: float
     heading_sd_rad: float
+    lever_near_m: Vector | None = None
+    """From the near sensor to the joint's centre, in its axes, where accelerations show it."""
+    lever_far_m: Vector | None = None
 
     def state(self) -> dict[str, Any]:
         """Return plain values."""
@@ -35,6 +38,6 @@ class JointAlignment:
     @staticmethod
     def from_state(state: dict[str, Any]) -> "JointAlignment":
         """Return the joint of a state."""
-        return JointAlignment(
-            **{**state, "axis_near": tuple(state["axis_near"]), "axis_far": tuple(state["axis_far"])}
-        )
+        vectors = ("axis_near", "axis_far", "lever_near_m", "lever_far_m")
+        given = {k: tuple(state[k]) for k in vectors if state.get(k) is not None}
+        return JointAlignment(**{**state, **given})

@@ -146,7 +146,8 @@ def _starts(equations: JointEquations) -> list[Guess]:
     axes_b = _cone(priors.axis_b, None)
     headings = np.arange(-np.pi, np.pi, np.pi / 6.0)
     if priors.heading is not None:
-        headings = priors.heading + np.array([-0.4, 0.0, 0.4])
+        middle, sd = priors.heading.at(equations.knots_s[:1])
+        headings = middle + np.minimum(sd, 0.6) * np.array([-1.5, -0.7, 0.0, 0.7, 1.5])
     a1 = np.einsum("nij,aj->ani", motion.world_from_a[::every], axes_a)
     a2 = np.einsum("nij,bj->bni", motion.world_from_b[::every], axes_b)
     weight = equations.rate_weight[::every]

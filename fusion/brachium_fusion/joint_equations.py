@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from brachium_body import rotation
-from brachium_fusion.joint_motion import JointMotion
+from brachium_fusion.joint_motion import JointMotion, knots, shares
 
 Floats = npt.NDArray[np.float64]
 
@@ -17,20 +17,35 @@ RATE_SHARE = 0.05
 """Of both sensors' rates: what skin adds to the first equation in movement."""
 ANGLE_SD = radians(27.0)
 """Of the second equation: 3 deg of tilt and skin, and neighbouring instants that err together."""
-TOGETHER = 30.0
-"""So many neighbouring instants count as one: skin's errors follow the movement, and repeating it repeats
-them."""
+INDEPENDENT = 6.0
+"""All instants together count as so many independent ones: skin's errors follow the movement, and
+repeating it repeats them."""
 LEAST_SINE = 0.3
 """Of the angle between the axes: nearly parallel ones would explain any movement."""
 CARRYING_SD = radians(12.0)
 """People's is 10 +- 5 deg valgus; little is presumed, least of all its sign."""
 HEADING_RATE_SD = radians(0.05)
 """rad/s: headings drift apart by this without magnetometers."""
-KNOT_S = 15.0
 LEAST_NOISE = 0.01
 """Residuals are never believed to be smaller than this part of what is expected."""
 LOSS_SCALE = 2.0
 """Beyond so many standard deviations residuals count less (soft L1)."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class HeadingPrior:
+    """What is believed of the heading at some instants, straight between them, constant beyond."""
+
+    time_s: Floats
+    heading: Floats
+    """(k,) rad."""
+    sd: Floats
+    """(k,) rad."""
+
+    def at(self, time_s: Floats) -> tuple[Floats, Floats]:
+        """Return heading and standard deviation at times (n,)."""
+        heading = np.interp(time_s, self.time_s, self.heading).astype(np.float64)
+        return heading, np.interp(time_s, self.time_s, self.sd).astype(np.float64)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -44,8 +59,7 @@ class AxisPriors:
     across_a_sd: float = radians(10.0)
     axis_b: Floats | None = None
     axis_b_sd: float = radians(12.0)
-    heading: float | None = None
-    heading_sd: float = radians(20.0)
+    heading: HeadingPrior | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -89,6 +103,7 @@ class JointEquations:
         speed = np.linalg.norm(motion.rate_a, axis=1) + np.linalg.norm(motion.rate_b, axis=1)
         self.rate_weight = 1.0 / (noise[0] * np.hypot(RATE_SD, RATE_SHARE * speed))
         self.angle_sd = noise[1] * ANGLE_SD
+        self._together = max(1.0, len(motion.time_s) / INDEPENDENT)
 
     @staticmethod
     def loss(residuals: Floats) -> Floats:
@@ -97,14 +112,14 @@ class JointEquations:
 
     def weights(self, residuals: Floats) -> Floats:
         """Return the weights with which squares stand for the loss; priors count in full."""
-        weight = 1.0 / (TOGETHER * np.sqrt(1.0 + (residuals / LOSS_SCALE) ** 2))
+        weight = 1.0 / (self._together * np.sqrt(1.0 + (residuals / LOSS_SCALE) ** 2))
         weight[2 * len(self.motion.time_s) :] = 1.0
         return weight
 
     def cost(self, guess: Guess) -> float:
         """Return the sum of the loss over all rows and of the priors' squares."""
         first, second, prior = self._residuals(guess)
-        return float((self.loss(first).sum() + self.loss(second).sum()) / TOGETHER + prior @ prior)
+        return float((self.loss(first).sum() + self.loss(second).sum()) / self._together + prior @ prior)
 
     def noise(self, guess: Guess) -> tuple[float, float]:
         """Return the factors by which both equations' residuals differ from RATE_SD and ANGLE_SD."""
@@ -187,24 +202,16 @@ class JointEquations:
             for side in np.linalg.svd(p.axis_b[None])[2][1:]:
                 add(float(side @ guess.axis_b) / p.axis_b_sd, guess.across_b @ side / p.axis_b_sd, 2)
         if p.heading is not None:
+            # what is said of neighbouring knots is one knowledge, not k independent ones
+            headings, sd = p.heading.at(self.knots_s)
+            sd = sd * np.sqrt(k)
+            off = rotation.wrap(guess.headings - headings) / sd
             for i in range(k):
-                off = float(rotation.wrap(guess.headings[i] - p.heading))
-                add(off / p.heading_sd, np.array([1.0 / p.heading_sd]), 5 + i)
+                add(float(off[i]), np.array([1.0 / sd[i]]), 5 + i)
         for i, gap in enumerate(np.diff(self.knots_s).tolist()):
             size = HEADING_RATE_SD * gap
             add((guess.headings[i + 1] - guess.headings[i]) / size, np.array([-1.0, 1.0]) / size, 5 + i)
         return np.array(residuals), np.array(rows)
-
-
-def knots(time_s: Floats) -> Floats:
-    """Return instants about KNOT_S apart from the first time to the last."""
-    length = float(time_s[-1] - time_s[0])
-    return np.linspace(float(time_s[0]), float(time_s[-1]), max(2, round(length / KNOT_S) + 1))
-
-
-def shares(time_s: Floats, knots_s: Floats) -> Floats:
-    """Return how much each knot counts at each time, (n, k), for straight lines between knots."""
-    return np.stack([np.interp(time_s, knots_s, row) for row in np.eye(len(knots_s))], axis=-1)
 
 
 def _turned(v: Floats, cosine: Floats, sine: Floats) -> Floats:

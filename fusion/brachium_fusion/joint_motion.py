@@ -1,4 +1,4 @@
-"""What two sensors beside a joint did: orientations and angular rates, thinned out for a fit. Pure."""
+"""What two sensors beside a joint did: orientations, rates and forces, thinned out for a fit. Pure."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -13,22 +13,30 @@ Floats = npt.NDArray[np.float64]
 ROWS_HZ = 10.0
 """Instants kept: movement of arms is below 5 Hz, and skin's wobble above it."""
 SMOOTH_S = 0.2
-"""Rates are averaged over about so long."""
+"""Rates and forces are averaged over about so long."""
 MOST_ROWS = 1500
+KNOT_S = 15.0
+"""The heading between two sensors is taken as straight over so long."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class JointMotion:
-    """n instants of sensors a (nearer to the trunk) and b (beyond the joint)."""
+    """n instants of sensors a (nearer to the trunk) and b (beyond the joint), each in its own world."""
 
     time_s: Floats
     """(n,) from row 0 of the records."""
     world_from_a: Floats
-    """(n, 3, 3), each sensor in the world of its own heading."""
+    """(n, 3, 3)."""
     world_from_b: Floats
     rate_a: Floats
-    """(n, 3) rad/s of sensor a, in a's world."""
+    """(n, 3) rad/s."""
     rate_b: Floats
+    spin_a: Floats
+    """(n, 3) rad/s^2: how the rate changes."""
+    spin_b: Floats
+    force_a: Floats | None = None
+    """(n, 3) specific force, m/s^2; None for sensors that deliver orientation only."""
+    force_b: Floats | None = None
 
     def part(self, first_s: float, end_s: float) -> "JointMotion":
         """Return the instants from first_s to end_s."""
@@ -39,38 +47,70 @@ class JointMotion:
             world_from_b=self.world_from_b[kept],
             rate_a=self.rate_a[kept],
             rate_b=self.rate_b[kept],
+            spin_a=self.spin_a[kept],
+            spin_b=self.spin_b[kept],
+            force_a=None if self.force_a is None else self.force_a[kept],
+            force_b=None if self.force_b is None else self.force_b[kept],
         )
 
 
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class SensorMotion:
+    """One sensor over all rows, NaN where unknown."""
+
+    world_from_sensor: Floats
+    """(n, 4)."""
+    acc: Floats | None = None
+    """(n, 3) specific force in sensor axes, m/s^2."""
+
+
 def joint_motion(
-    world_from_a: Floats, world_from_b: Floats, spans: Sequence[tuple[int, int]], rate_hz: float
+    a: SensorMotion, b: SensorMotion, spans: Sequence[tuple[int, int]], rate_hz: float
 ) -> JointMotion:
-    """Return the motion within spans (first row, end row) of orientations (n, 4), NaN where unknown.
+    """Return the motion within spans (first row, end row).
 
     Rates are taken from the orientations, so sensors that deliver nothing else serve as well, and a gyroscope
     bias that the filter has found is gone from them. Runs shorter than 1 s between gaps are left out.
     """
-    known = np.isfinite(world_from_a[:, 0]) & np.isfinite(world_from_b[:, 0])
+    forces = a.acc is not None and b.acc is not None
+    known = np.isfinite(a.world_from_sensor[:, 0]) & np.isfinite(b.world_from_sensor[:, 0])
+    if a.acc is not None and b.acc is not None:
+        known &= np.isfinite(a.acc[:, 0]) & np.isfinite(b.acc[:, 0])
     inside = np.zeros(len(known), dtype=np.bool_)
     for first, end in spans:
         inside[max(0, first) : end] = True
     step = max(1, round(rate_hz / ROWS_HZ), int(np.ceil(inside.sum() / MOST_ROWS)))
-    rows = [np.zeros(0, dtype=np.intp)]
-    rate_a, rate_b = np.zeros((len(known), 3)), np.zeros((len(known), 3))
+    kept = [np.zeros(0, dtype=np.intp)]
+    columns = [np.zeros((0, 18))]
     for first, end in _runs(known & inside):
         if end - first < rate_hz:
             continue
-        rate_a[first:end] = _rates(world_from_a[first:end], rate_hz)
-        rate_b[first:end] = _rates(world_from_b[first:end], rate_hz)
-        rows.append(np.arange(first + step // 2, end, step))
-    kept = np.concatenate(rows)
+        run, cut = slice(first, end), slice(step // 2, None, step)
+        kept.append(np.arange(first, end)[cut])
+        columns.append(np.concatenate([_moving(s, run, rate_hz)[cut] for s in (a, b)], axis=1))
+    rows, moving = np.concatenate(kept), np.concatenate(columns)
     return JointMotion(
-        time_s=kept / rate_hz,
-        world_from_a=rotation.to_matrix(world_from_a[kept]),
-        world_from_b=rotation.to_matrix(world_from_b[kept]),
-        rate_a=rate_a[kept],
-        rate_b=rate_b[kept],
+        time_s=rows / rate_hz,
+        world_from_a=rotation.to_matrix(a.world_from_sensor[rows]),
+        world_from_b=rotation.to_matrix(b.world_from_sensor[rows]),
+        rate_a=moving[:, 0:3],
+        spin_a=moving[:, 3:6],
+        force_a=moving[:, 6:9] if forces else None,
+        rate_b=moving[:, 9:12],
+        spin_b=moving[:, 12:15],
+        force_b=moving[:, 15:18] if forces else None,
     )
+
+
+def knots(time_s: Floats) -> Floats:
+    """Return instants about KNOT_S apart from the first time to the last."""
+    length = float(time_s[-1] - time_s[0])
+    return np.linspace(float(time_s[0]), float(time_s[-1]), max(2, round(length / KNOT_S) + 1))
+
+
+def shares(time_s: Floats, knots_s: Floats) -> Floats:
+    """Return how much each knot counts at each time, (n, k), for straight lines between knots."""
+    return np.stack([np.interp(time_s, knots_s, row) for row in np.eye(len(knots_s))], axis=-1)
 
 
 def _runs(kept: npt.NDArray[np.bool_]) -> list[tuple[int, int]]:
@@ -78,14 +118,24 @@ def _runs(kept: npt.NDArray[np.bool_]) -> list[tuple[int, int]]:
     return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
 
 
-def _rates(world_from_sensor: Floats, rate_hz: float) -> Floats:
-    """Return angular rates (n, 3) rad/s in the world, smoothed by a Hann window without delay."""
-    turn = rotation.multiply(world_from_sensor[1:], rotation.inverse(world_from_sensor[:-1]))
+def _moving(sensor: SensorMotion, run: slice, rate_hz: float) -> Floats:
+    """Return rate, its change, and force (n, 9) in the sensor's world, smoothed without delay."""
+    quats = sensor.world_from_sensor[run]
+    turn = rotation.multiply(quats[1:], rotation.inverse(quats[:-1]))
     between = rotation.to_rotation_vector(turn) * rate_hz
-    rates = 0.5 * (np.concatenate([between[:1], between]) + np.concatenate([between, between[-1:]]))
+    rate = 0.5 * (np.concatenate([between[:1], between]) + np.concatenate([between, between[-1:]]))
+    force = np.zeros_like(rate) if sensor.acc is None else rotation.rotate(quats, sensor.acc[run])
+    rate, force = _smooth(rate, rate_hz), _smooth(force, rate_hz)
+    return np.concatenate([rate, np.gradient(rate, 1.0 / rate_hz, axis=0), force], axis=1).astype(np.float64)
+
+
+def _smooth(values: Floats, rate_hz: float) -> Floats:
+    """Return values (n, 3) under a Hann window."""
     window = np.hanning(2 * max(1, round(0.5 * SMOOTH_S * rate_hz)) + 3)
     window /= window.sum()
     half = len(window) // 2
-    padded = np.concatenate([np.repeat(rates[:1], half, axis=0), rates, np.repeat(rates[-1:], half, axis=0)])
+    padded = np.concatenate(
+        [np.repeat(values[:1], half, axis=0), values, np.repeat(values[-1:], half, axis=0)]
+    )
     columns = [np.convolve(padded[:, i], window, mode="valid") for i in range(3)]
     return np.stack(columns, axis=-1).astype(np.float64)

@@ -31,7 +31,7 @@ Floats = npt.NDArray[np.float64]
 STRAIGHTEST = radians(-5.0)
 """Few elbows bend back further; a movement that seems to, moves the zero."""
 STRAIGHTEST_SD = radians(3.0)
-PLAUSIBLE = (radians(-15.0), radians(160.0))
+MOST_BENT = radians(155.0)
 VERTICAL_SD = radians(7.0)
 """Of the hanging upper arm, and of the turning axis as the forearm's long axis."""
 
@@ -55,7 +55,7 @@ class ElbowPose:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ElbowFrames:
-    """Where the sensors sit, and the elbow over the movement; angles rad, ISB's signs as for a right arm."""
+    """Where the sensors sit on their segments; angles rad."""
 
     axis_upper: Floats
     """Flexion axis (3,) in the upper-arm sensor, to the subject's right."""
@@ -66,11 +66,8 @@ class ElbowFrames:
     carrying: float
     """Valgus negative, on either side."""
     pose_flexion: float
-    flexion: Floats
-    """(n,) over the movement."""
-    pronation: Floats
     merit: float
-    """How well the signs agree with gravity, range and mounting."""
+    """How well signs agree with gravity, range and mounting, as squares of standard deviations."""
 
 
 def elbow_frames(
@@ -86,7 +83,15 @@ def elbow_frames(
         _frames(motion, found, pose, side, sign_a * found.axis_a, sign_b * found.axis_b)
         for sign_a, sign_b in product((1.0, -1.0), repeat=2)
     )
-    judged = [replace(f, merit=_merit(motion, f, pose, nominal_upper, nominal_forearm)) for f in choices]
+    judged = [
+        replace(
+            f,
+            merit=_merit(
+                motion, f, pose, elbow_angles(motion, found, f, side)[0], nominal_upper, nominal_forearm
+            ),
+        )
+        for f in choices
+    ]
     return max(judged, key=lambda frames: frames.merit)
 
 
@@ -99,9 +104,7 @@ def _frames(
     )
     forearm_axis = rotation.rotate(upper_from_forearm, axis_b)
     y0, x0 = _beside(axis_a, forearm_axis)
-    turns = rotation.to_matrix(rotation.about(2, found.heading_at(motion.time_s)))
-    relative = np.swapaxes(motion.world_from_a, 1, 2) @ turns @ motion.world_from_b
-    along = relative @ axis_b
+    along = _relative(motion, found) @ axis_b
     beyond = np.arctan2(-(along @ x0), along @ y0)  # flexion beyond that of the pose
     flexion = _flexion_in_pose(pose, y0, x0, beyond, found.axis_b_sd)
     y = cos(flexion) * y0 + sin(flexion) * x0
@@ -112,9 +115,7 @@ def _frames(
     # in the forearm the flexion axis lies at Y(-pronation) Z: turn it back
     z = cos(pronation) * z0 + sin(pronation) * -x1
     forearm_from_sensor = rotation.from_matrix(np.stack([np.cross(axis_b, z), axis_b, z]))
-    joint = rotation.to_matrix(upper_from_sensor) @ relative @ rotation.to_matrix(forearm_from_sensor).T
-    carrying = float(np.arcsin(np.clip(np.median(joint[:, 2, 1]), -1.0, 1.0)))
-    turned = np.arctan2(-joint[:, 2, 0], joint[:, 2, 2])
+    carrying = float(np.arcsin(np.clip(np.median(along @ axis_a), -1.0, 1.0)))
     return ElbowFrames(
         axis_upper=axis_a,
         axis_forearm=axis_b,
@@ -122,10 +123,26 @@ def _frames(
         forearm_from_sensor=forearm_from_sensor,
         carrying=carrying if side == "right" else -carrying,
         pose_flexion=flexion,
-        flexion=np.arctan2(-joint[:, 0, 1], joint[:, 1, 1]),
-        pronation=turned if side == "right" else -turned,
         merit=0.0,
     )
+
+
+def elbow_angles(
+    motion: JointMotion, found: JointAxes, frames: ElbowFrames, side: Side
+) -> tuple[Floats, Floats]:
+    """Return flexion and pronation (n,) rad over a movement."""
+    upper, forearm = (rotation.to_matrix(q) for q in (frames.upper_from_sensor, frames.forearm_from_sensor))
+    joint = upper @ _relative(motion, found) @ forearm.T
+    flexion = np.arctan2(-joint[:, 0, 1], joint[:, 1, 1])
+    turned = np.arctan2(-joint[:, 2, 0], joint[:, 2, 2])
+    return flexion, turned if side == "right" else -turned
+
+
+def _relative(motion: JointMotion, found: JointAxes) -> Floats:
+    """Return upper-arm sensor from forearm sensor (n, 3, 3)."""
+    turns = rotation.to_matrix(rotation.about(2, found.heading_at(motion.time_s)))
+    relative: Floats = np.swapaxes(motion.world_from_a, 1, 2) @ turns @ motion.world_from_b
+    return relative
 
 
 def _beside(axis: Floats, direction: Floats) -> tuple[Floats, Floats]:
@@ -152,7 +169,7 @@ def _flexion_in_pose(pose: ElbowPose, y0: Floats, x0: Floats, beyond: Floats, ax
         values.append(seen)
         weights.append(sd**-2)
     flexion = float(np.average(values, weights=weights))
-    short = STRAIGHTEST - (flexion + float(np.percentile(beyond, 2.0)))
+    short = STRAIGHTEST - (flexion + float(np.percentile(beyond, 1.0)))
     if short > 0.0:
         weight = STRAIGHTEST_SD**-2
         flexion += short * weight / (weight + sum(weights))
@@ -163,23 +180,25 @@ def _merit(
     motion: JointMotion,
     frames: ElbowFrames,
     pose: ElbowPose,
+    flexion: Floats,
     nominal_upper: Floats | None,
     nominal_forearm: Floats | None,
 ) -> float:
     """Return how well signs agree with gravity, range and mounting."""
     up = np.array([0.0, 0.0, 1.0])
-    low, high = PLAUSIBLE
-    over = np.maximum(frames.flexion - high, 0.0) + np.maximum(low - frames.flexion, 0.0)
-    merit = -4.0 * float(np.mean(np.minimum(over, 0.5)))
+    strained = (frames.pose_flexion - pose.flexion) / pose.flexion_sd
+    low, high = np.percentile(flexion, [1.0, 99.0])
+    beyond = max(0.0, STRAIGHTEST - float(low), float(high) - MOST_BENT) / STRAIGHTEST_SD
+    merit = -min(25.0, strained**2) - min(25.0, beyond**2)
     y = rotation.rotate(rotation.inverse(frames.upper_from_sensor), np.array([0.0, 1.0, 0.0]))
-    merit += 2.0 * float(rotation.rotate(pose.upper_sensor, y) @ up)
+    merit += 20.0 * float(rotation.rotate(pose.upper_sensor, y) @ up)
     if pose.hanging_forearm:
-        merit += 2.0 * float(rotation.rotate(pose.forearm_sensor, frames.axis_forearm) @ up)
-    merit += 0.2 * float(np.mean(motion.world_from_b[:, 2] @ frames.axis_forearm))
+        merit += 20.0 * float(rotation.rotate(pose.forearm_sensor, frames.axis_forearm) @ up)
+    merit += 2.0 * float(np.mean(motion.world_from_b[:, 2] @ frames.axis_forearm))
     if nominal_upper is not None:
-        merit += 0.5 * float(rotation.rotate(nominal_upper, frames.axis_upper)[2])
+        merit += 5.0 * float(rotation.rotate(nominal_upper, frames.axis_upper)[2])
     if nominal_forearm is not None:
-        merit += 0.5 * float(rotation.rotate(nominal_forearm, frames.axis_forearm)[1])
+        merit += 5.0 * float(rotation.rotate(nominal_forearm, frames.axis_forearm)[1])
     return merit
 
 

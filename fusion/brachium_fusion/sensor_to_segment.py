@@ -18,6 +18,7 @@ import numpy.typing as npt
 from brachium_body import rotation
 from brachium_body.segments import SIDES, Side, arm_segments
 from brachium_fusion.elbow_alignment import ElbowFound, Refused, find_elbow
+from brachium_fusion.joint_motion import SensorMotion
 from brachium_fusion.pose import POSES, Alignment, PoseName, PoseSensor, align, pose_orientations
 from brachium_fusion.segment_frames import ElbowPose
 
@@ -52,8 +53,10 @@ class SensorRecord:
     nominal_mounting: Floats | None = None
     """segment_from_sensor (4,) as the wearer was told to put it on; None when nothing is known."""
     gyr: Floats | None = None
-    """(n, 3) rad/s and below m/s^2, calibrated: not needed, orientations say all that is used."""
+    """(n, 3) rad/s; not used: rates are taken from the orientations."""
     acc: Floats | None = None
+    """(n, 3) m/s^2, calibrated; finds the heading between sensors of a joint that is moved about. None for
+    sensors that deliver orientation only."""
     mag: Floats | None = None
 
 
@@ -145,8 +148,8 @@ def _elbow(
     stated = _stated(pose)
     hanging = pose.kind == "n-pose"
     return find_elbow(
-        records[upper].world_from_sensor,
-        records[forearm].world_from_sensor,
+        SensorMotion(world_from_sensor=records[upper].world_from_sensor, acc=records[upper].acc),
+        SensorMotion(world_from_sensor=records[forearm].world_from_sensor, acc=records[forearm].acc),
         ElbowPose(
             upper_sensor=rotation.mean(still[upper]),
             forearm_sensor=rotation.mean(still[forearm]),
