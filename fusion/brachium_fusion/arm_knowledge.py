@@ -1,7 +1,7 @@
 """What is known of one arm before it moves: its joints' axes and centres as its sensors see them. Pure."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
@@ -12,6 +12,7 @@ from brachium_body.lengths import ArmLengths
 from brachium_body.segments import Side, arm_segments
 from brachium_fusion.joint_model import Joint
 from brachium_fusion.pose import Alignment
+from brachium_fusion.shoulder_model import ArmModel
 
 Floats = npt.NDArray[np.float64]
 Centres = Mapping[str, tuple[int, Mapping[str, Floats]]]
@@ -31,10 +32,14 @@ class ArmKnowledge:
 
     elbow: Joint | None = None
     wrist: Joint | None = None
+    model: ArmModel | None = None
+    """For the shoulder's displacement; None without upper arm and forearm aligned."""
 
     def plain(self) -> list[Any]:
         """Return all of it as plain values that compare."""
-        return [None if joint is None else _plain(joint) for joint in (self.elbow, self.wrist)]
+        joints = [None if joint is None else _plain(joint) for joint in (self.elbow, self.wrist)]
+        model = {} if self.model is None else asdict(self.model)
+        return [*joints, {k: v.tolist() if isinstance(v, np.ndarray) else v for k, v in model.items()}]
 
 
 def _plain(joint: Joint) -> list[Any]:
@@ -50,6 +55,28 @@ def arm_knowledge(
     return ArmKnowledge(
         elbow=_joint("elbow", upper, forearm, side, alignment, lengths, stated),
         wrist=_joint("wrist", forearm, hand, side, alignment, lengths, stated),
+        model=_model(side, alignment, lengths, stated),
+    )
+
+
+def _model(side: Side, alignment: Alignment | None, lengths: ArmLengths, stated: Centres) -> ArmModel | None:
+    upper, forearm, _ = arm_segments(side)
+    if alignment is None or not {upper, forearm} <= alignment.mounting.keys() - alignment.assumed:
+        return None
+    from_upper, from_forearm = (rotation.inverse(alignment.mounting[s]) for s in (upper, forearm))
+    on_upper, on_forearm, _ = places(side, lengths)
+    told_shoulder = stated.get("shoulder", (3, {}))[1].get(upper)
+    told_elbow = stated.get("elbow", (2, {}))[1].get(forearm)
+    elbow = alignment.joints.get(f"elbow_{side[0]}")
+    return ArmModel(
+        upper_arm_m=lengths.upper_arm,
+        forearm_m=lengths.forearm,
+        sensor_from_upper_arm=from_upper,
+        sensor_from_forearm=from_forearm,
+        lever_upper=rotation.rotate(from_upper, -on_upper) if told_shoulder is None else told_shoulder,
+        lever_forearm=rotation.rotate(from_forearm, -on_forearm) if told_elbow is None else told_elbow,
+        carrying_rad=0.0 if elbow is None else elbow.carrying_rad,
+        side=side,
     )
 
 
@@ -71,13 +98,23 @@ def _joint(
         return Joint(axes=axes, lever_a=lever_a, lever_b=lever_b)
     from_a, from_b = (rotation.inverse(alignment.mounting[s]) for s in (a, b))
     told_a, told_b = levers(name, side, lengths)
+    found = alignment.joints.get(f"{name}_{side[0]}")
+    axis_a = rotation.rotate(from_a, [0.0, 0.0, 1.0])
+    axis_b = rotation.rotate(from_b, [0.0, 1.0, 0.0] if name == "elbow" else [1.0, 0.0, 0.0])
     return Joint(
         axes=axes,
-        axis_a=rotation.rotate(from_a, [0.0, 0.0, 1.0]),
-        axis_b=rotation.rotate(from_b, [0.0, 1.0, 0.0] if name == "elbow" else [1.0, 0.0, 0.0]),
+        axis_a=axis_a if found is None else np.array(found.axis_near),
+        axis_b=axis_b if found is None else np.array(found.axis_far),
+        carrying_rad=0.0 if found is None else mirrored(found.carrying_rad, side),
         lever_a=rotation.rotate(from_a, told_a) if lever_a is None else lever_a,
         lever_b=rotation.rotate(from_b, told_b) if lever_b is None else lever_b,
     )
+
+
+def mirrored(carrying_rad: float, side: Side) -> float:
+    """Return the elbow's carrying angle as an angle between its axes, of an angle that means the same on both
+    sides."""
+    return carrying_rad if side == "right" else -carrying_rad
 
 
 def places(side: Side, lengths: ArmLengths) -> tuple[Floats, Floats, Floats]:

@@ -8,11 +8,13 @@ import numpy.typing as npt
 
 from brachium_body import rotation
 from brachium_body.segments import Segment, part_of
+from brachium_fusion.best_material import Material, TimedSpan
 from brachium_fusion.pipeline import Pipeline
 from brachium_fusion.pose import Alignment
 from brachium_fusion.session_terms import check_session
 from brachium_fusion.settings import Settings
 from brachium_fusion.subject import Subject
+from brachium_fusion.uniform import Series
 from brachium_wire.capture import Capture, CaptureSegment
 from brachium_wire.messages import Info, SensorCalibration, Session
 from brachium_wire.samples import Samples
@@ -60,6 +62,38 @@ def session(capture: Capture) -> Session:
     )
     check_session(said)
     return said
+
+
+def material(capture: Capture) -> Material:
+    """Return what `--mode best` starts from."""
+    spans, start = capture.settings.calibration, _start(capture)
+    timed = [TimedSpan(kind=f.motion, from_s=start + f.from_s, to_s=start + f.to_s) for f in spans.functional]
+    if spans.pose is not None and spans.to_s is not None:
+        begin_s, end_s = start + (spans.from_s or 0.0), start + spans.to_s
+        timed.insert(0, TimedSpan(kind=spans.pose, from_s=begin_s, to_s=end_s, angles_deg=spans.angles_deg))
+    return Material(
+        series={
+            name: Series(
+                time_s=data.t, rate_hz=data.rate_hz, gyr=data.gyr, acc=data.acc, mag=data.mag, quat=data.quat
+            )
+            for name, data in capture.segments.items()
+        },
+        infos=infos(capture),
+        sequences={name: np.arange(len(data.t)) for name, data in capture.segments.items()},
+        session=session(capture),
+        spans=tuple(timed),
+        stated=stated(capture),
+        zero_ns=ZERO_NS,
+        warnings=capture.warnings,
+    )
+
+
+def stated(capture: Capture) -> dict[str, tuple[int, dict[str, Floats]]]:
+    """Return what capture.toml says of joints."""
+    return {
+        name: (joint.axes, {s: np.array(v) for s, v in joint.centre_from.items()})
+        for name, joint in capture.settings.joint.items()
+    }
 
 
 def output_times(capture: Capture, rate_hz: float | None) -> Floats:
@@ -136,10 +170,7 @@ def _start(capture: Capture) -> float:
 
 def _begin(subject: Subject, capture: Capture, instants: Sequence[int]) -> None:
     subject.session = session(capture)
-    subject.stated = {
-        name: (joint.axes, {s: np.array(v) for s, v in joint.centre_from.items()})
-        for name, joint in capture.settings.joint.items()
-    }
+    subject.stated = stated(capture)
     subject.use_instants(instants)
     for segment, info in infos(capture).items():
         subject.inform(segment, info)

@@ -8,14 +8,24 @@ would have given.
 
 from collections.abc import Iterable
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
+import msgspec
+import numpy as np
+import numpy.typing as npt
+
+from brachium_fusion.best_material import Material, TimedSpan
 from brachium_fusion.pipeline import Pipeline, Solved
 from brachium_fusion.settings import Change, Settings
+from brachium_fusion.uniform import Series
 from brachium_wire import keys
-from brachium_wire.codec import WireError, decode_topic
-from brachium_wire.messages import Event, Skeleton, Snapshot
+from brachium_wire.codec import WireError, decode_batch, decode_topic
+from brachium_wire.messages import Event, Info, Session, Skeleton, Snapshot
 from brachium_wire.recording import Recorded
+from brachium_wire.samples import Samples, read_samples
+from brachium_wire.topics import TOPICS
+
+Floats = npt.NDArray[np.float64]
 
 DRAIN = 512
 """Messages between two rounds of kinematics: large rounds are cheap, and how large plays no part in the
@@ -89,6 +99,77 @@ def solve(subject: str, contents: Contents, settings: Settings) -> tuple[Pipelin
     pipeline.finish()
     solved.extend(pipeline.skeletons())
     return pipeline, solved
+
+
+def material(contents: Contents) -> Material:
+    """Return what `--mode best` starts from: of each segment the samples of the sensor that was last there,
+    those that came late among them. Raises ValueError when there are none."""
+    infos: dict[str, Info] = {}
+    found: dict[str, list[Samples]] = {}
+    for key, payload in contents.samples:
+        with suppress(WireError):
+            if key.topic == "imu":
+                found.setdefault(key.detail, []).append(
+                    read_samples(decode_batch(payload, TOPICS["imu"].max_bytes))
+                )
+                continue
+            info = decode_topic(payload, "info")
+            assert isinstance(info, Info)
+            if key.detail in infos and infos[key.detail] != info:
+                found.pop(key.detail, None)
+            infos[key.detail] = info
+    zero_ns = min((b.time_ns[0] for s, batches in found.items() if s in infos for b in batches), default=0)
+    joined = {s: _joined(batches, zero_ns) for s, batches in found.items() if s in infos}
+    return Material(
+        series={s: replace(one, rate_hz=infos[s].rate_hz) for s, (one, _) in joined.items()},
+        infos={s: infos[s] for s in joined},
+        sequences={s: numbers for s, (_, numbers) in joined.items()},
+        session=_session(contents),
+        spans=_spans(contents, zero_ns),
+        find_pose=True,
+        zero_ns=zero_ns,
+    )
+
+
+def _joined(batches: list[Samples], zero_ns: int) -> tuple[Series, npt.NDArray[np.int64]]:
+    """Return a sensor's samples in order of time, each once."""
+    times = np.concatenate([np.array(b.time_ns, dtype=np.int64) for b in batches])
+    numbers = np.concatenate([b.sequence + np.arange(len(b)) for b in batches])
+    _, order = np.unique(times, return_index=True)
+    blocks = {name: _block(batches, name) for name in ("gyr", "acc", "mag", "quat")}
+    chosen = {name: None if block is None else block[order] for name, block in blocks.items()}
+    return Series(time_s=1e-9 * (times[order] - zero_ns), rate_hz=1.0, **chosen), numbers[order]
+
+
+def _block(batches: list[Samples], name: str) -> Floats | None:
+    """Return one block of all batches (n, width), NaN where a batch has none; None when no batch has it."""
+    width = 4 if name == "quat" else 3
+    rows = []
+    for batch in batches:
+        values = getattr(batch, name)
+        full = np.full((len(batch), width), np.nan)
+        if values is not None:
+            full[list(batch.mag_index) if name == "mag" and batch.mag_index is not None else slice(None)] = (
+                values
+            )
+        rows.append(full)
+    block = np.concatenate(rows)
+    return None if np.isnan(block).all() else block
+
+
+def _session(contents: Contents) -> Session:
+    """Return the session as it was at the end."""
+    told = [change.data for change in contents.changes if change.kind == "session"]
+    return msgspec.convert(told[-1], Session) if told else Session()
+
+
+def _spans(contents: Contents, zero_ns: int) -> tuple[TimedSpan, ...]:
+    """Return what the last alignment by movement was made from."""
+    told = [change.data.get("spans", []) for change in contents.changes if change.kind == "align"]
+    return tuple(
+        TimedSpan(kind=kind, from_s=1e-9 * (a - zero_ns), to_s=1e-9 * (b - zero_ns), angles_deg=angles)
+        for kind, a, b, angles in (told[-1] if told else ())
+    )
 
 
 def largest_difference(solved: Iterable[Skeleton], live: Iterable[Skeleton]) -> tuple[int, float, float]:

@@ -1,6 +1,6 @@
 """What one chooses of the pipeline, and what changes while it runs. Pure."""
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any, NamedTuple
 
 from brachium_fusion.orientation import FilterName
@@ -24,6 +24,15 @@ class Settings:
     def binds(self) -> bool:
         """Joints have a say; other filters stay as they were published."""
         return self.joints and self.filter == "auto"
+
+    def chosen(self, filter_name: FilterName | None, magnetometer: bool, rate_hz: float | None) -> "Settings":
+        """Return the same with what somebody chose instead; None, or True, leaves it."""
+        return replace(
+            self,
+            filter=filter_name or self.filter,
+            magnetometer=self.magnetometer and magnetometer,
+            rate_hz=rate_hz or self.rate_hz,
+        )
 
     def plain(self) -> dict[str, Any]:
         """Return the settings as plain values: Settings(**plain) are the same."""

@@ -1,64 +1,30 @@
-"""`brachium solve`: a recording or a capture folder to a table, through the same pipeline as live. The
-shell: it
-reads and writes files."""
+"""`brachium solve`: a recording or a capture folder to a table. The shell: it reads and writes files.
+
+`live` takes the way of the live service, through the same pipeline; `best` uses past and future.
+"""
 
 from collections import Counter
-from collections.abc import Sequence
-from dataclasses import dataclass, field
-from pathlib import Path
-from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
-from brachium_fusion import from_capture, from_recording
-from brachium_fusion.orientation import FilterName
-from brachium_fusion.result import GROUPS, Group, tabulate
+from brachium_fusion import best, from_capture, from_recording
+from brachium_fusion.best_material import Material
+from brachium_fusion.result import tabulate
 from brachium_fusion.settings import Settings
+from brachium_fusion.solve_terms import (
+    MODES,
+    NO_CALIBRATION,
+    Mode,
+    Outcome,
+    SolveError,
+    SolveReport,
+    SolveSettings,
+)
 from brachium_wire import capture as captures
 from brachium_wire import recording, table
-from brachium_wire.messages import Forward, Skeleton
 
-
-class SolveError(ValueError):
-    """The input cannot be solved: one line that says what was expected, what came and what to do."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class SolveSettings:
-    """What `brachium solve` takes."""
-
-    input: Path
-    out: Path | None = None
-    """`.csv` or `.parquet`; None writes nothing."""
-    subject: str | None = None
-    """Which subject of a recording; needed only where there are several."""
-    filter: FilterName | None = None
-    """None: what the recording used live; `auto` for a capture folder."""
-    magnetometer: bool = True
-    rate_hz: float | None = None
-    groups: Sequence[Group] = GROUPS
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class SolveReport:
-    """What was solved."""
-
-    rows: int
-    sides: list[str]
-    filter: str
-    forward: Forward
-    """Which rule said where forward is."""
-    quality: dict[str, dict[str, int]]
-    """Per segment: instants by quality."""
-    drops: dict[str, int]
-    warnings: list[str]
-    scores: dict[str, float] = field(default_factory=dict)
-    live_compared: int = 0
-    """Of a recording: instants that were live, too, and how far the two differ at most."""
-    live_angle_rad: float | None = None
-    live_position_m: float | None = None
-    out: str | None = None
-    skeletons: list[Skeleton] = field(default_factory=list, repr=False)
+__all__ = ["MODES", "Mode", "SolveError", "SolveReport", "SolveSettings", "run"]
 
 
 def run(settings: SolveSettings) -> SolveReport:
@@ -68,43 +34,62 @@ def run(settings: SolveSettings) -> SolveReport:
     """
     if settings.rate_hz is not None and not 1.0 <= settings.rate_hz <= 2000.0:
         raise SolveError(f"--rate must be 1 to 2000 Hz, not {settings.rate_hz:g}")
+    if settings.mode not in MODES:
+        raise SolveError(f"--mode {settings.mode!r} is not known; choose one of {', '.join(MODES)}")
+    if settings.mode == "best" and settings.filter not in (None, "auto"):
+        raise SolveError(f"--mode best has a way of its own: leave --filter {settings.filter} out")
     if settings.input.is_dir():
-        return _capture(settings)
+        return _finish(settings, _capture(settings))
     if not settings.input.exists():
         raise SolveError(
             f"{settings.input}: no such file or folder; give a recording (.mcap) or a capture folder"
         )
-    return _recording(settings)
+    return _finish(settings, _recording(settings))
 
 
-def _capture(settings: SolveSettings) -> SolveReport:
+def _capture(settings: SolveSettings) -> Outcome:
     capture = captures.load(settings.input)
-    chosen = Settings(filter=settings.filter or "auto", magnetometer=settings.magnetometer, auto_pose=False)
     times = from_capture.output_times(capture, settings.rate_hz)
+    times_ns = from_capture.nanoseconds(times).tolist()
+    chosen = Settings(filter=settings.filter or "auto", magnetometer=settings.magnetometer, auto_pose=False)
+    if settings.mode == "best":
+        return _best(from_capture.material(capture), chosen, times, times_ns, times, {})
     pipeline, alignment = from_capture.solve(capture, chosen, times)
-    skeletons = [solved.skeleton for solved in pipeline.skeletons()]
-    warnings = list(capture.warnings)
-    if alignment is None:
-        warnings.append(
-            "no calibration: mounting taken as stated (identity where not), quality uncalibrated; give "
-            "[calibration] in capture.toml"
-        )
-    else:
-        warnings.extend(alignment.warnings)
-    subject = pipeline.subject(from_capture.SUBJECT)
-    return _finish(
-        settings,
-        chosen,
-        skeletons,
-        from_capture.nanoseconds(times).tolist(),
-        times,
-        drops=subject.drops,
-        warnings=warnings,
-        scores={} if alignment is None else alignment.scores,
+    return Outcome(
+        chosen=chosen,
+        skeletons=[solved.skeleton for solved in pipeline.skeletons()],
+        times_ns=times_ns,
+        times_s=times,
+        drops=pipeline.subject(from_capture.SUBJECT).drops,
+        warnings=[*capture.warnings, *([NO_CALIBRATION] if alignment is None else alignment.warnings)],
+        alignment=alignment,
     )
 
 
-def _recording(settings: SolveSettings) -> SolveReport:
+def _best(
+    material: Material,
+    chosen: Settings,
+    times_s: npt.NDArray[np.float64],
+    times_ns: list[int],
+    shown_s: npt.NDArray[np.float64],
+    metadata: dict[str, object],
+) -> Outcome:
+    found = best.solve(material, chosen, times_s)
+    nothing = [NO_CALIBRATION] if found.alignment is None else []
+    return Outcome(
+        chosen=chosen,
+        skeletons=found.skeletons,
+        times_ns=times_ns,
+        times_s=shown_s,
+        warnings=[*material.warnings, *found.warnings, *nothing],
+        alignment=found.alignment,
+        metadata=metadata,
+        parts=found.parts,
+        refused=found.refused,
+    )
+
+
+def _recording(settings: SolveSettings) -> Outcome:
     with recording.read(settings.input) as messages:
         subjects = from_recording.sort_out(messages)
         warning = messages.warning
@@ -118,12 +103,10 @@ def _recording(settings: SolveSettings) -> SolveReport:
         raise SolveError(f"{settings.input}: holds no subject {name!r}; there are {', '.join(subjects)}")
     contents = subjects[name]
     live = from_recording.settings_of(contents)
-    chosen = Settings(
-        filter=settings.filter or live.filter,
-        magnetometer=live.magnetometer and settings.magnetometer,
-        rate_hz=settings.rate_hz or live.rate_hz,
-        auto_pose=live.auto_pose,
-    )
+    chosen = live.chosen(settings.filter, settings.magnetometer, settings.rate_hz)
+    warnings = [warning] if warning else []
+    if settings.mode == "best":
+        return _best_recording(name, contents, chosen, warnings)
     pipeline, solved = from_recording.solve(name, contents, chosen)
     skeletons = [s.skeleton for s in solved if s.subject == name]
     compared, angle, position = (
@@ -131,44 +114,44 @@ def _recording(settings: SolveSettings) -> SolveReport:
     )
     times_ns = sorted({s.time_ns for s in skeletons})
     zero = times_ns[0] if times_ns else 0
-    warnings = [warning] if warning else []
     alignment = pipeline.subject(name).alignment
-    if alignment is None:
-        warnings.append("no calibration pose was found: quality uncalibrated")
-    else:
-        warnings.extend(alignment.warnings)
-    return _finish(
-        settings,
-        chosen,
-        skeletons,
-        times_ns,
-        (np.array(times_ns) - zero) * 1e-9,
+    nothing = ["no calibration pose was found: quality uncalibrated"]
+    return Outcome(
+        chosen=chosen,
+        skeletons=skeletons,
+        times_ns=times_ns,
+        times_s=(np.array(times_ns) - zero) * 1e-9,
         drops=pipeline.subject(name).drops + pipeline.drops,
-        warnings=warnings,
-        scores={} if alignment is None else alignment.scores,
+        warnings=[*warnings, *(nothing if alignment is None else alignment.warnings)],
+        alignment=alignment,
         metadata={"subject": name, "time_zero_ns": zero},
         live=(compared, angle, position) if compared else None,
     )
 
 
-def _finish(
-    settings: SolveSettings,
-    chosen: Settings,
-    skeletons: list[Skeleton],
-    times_ns: Sequence[int],
-    times_s: Any,
-    *,
-    drops: Counter[str],
-    warnings: list[str],
-    scores: dict[str, float],
-    metadata: dict[str, Any] | None = None,
-    live: tuple[int, float, float] | None = None,
-) -> SolveReport:
+def _best_recording(
+    name: str, contents: from_recording.Contents, chosen: Settings, warnings: list[str]
+) -> Outcome:
+    material = from_recording.material(contents)
+    first_s, last_s = material.span_s()
+    period_ns = round(1e9 / chosen.rate_hz)
+    first = -(-(material.zero_ns + round(1e9 * first_s)) // period_ns)
+    count = (material.zero_ns + round(1e9 * last_s)) // period_ns - first + 1
+    times_ns = ((first + np.arange(count)) * period_ns).tolist()
+    times_s = np.asarray(1e-9 * (np.array(times_ns, dtype=np.int64) - material.zero_ns), dtype=np.float64)
+    metadata: dict[str, object] = {"subject": name, "time_zero_ns": times_ns[0]}
+    outcome = _best(material, chosen, times_s, times_ns, times_s - times_s[0], metadata)
+    outcome.warnings[:0] = warnings
+    return outcome
+
+
+def _finish(settings: SolveSettings, outcome: Outcome) -> SolveReport:
+    skeletons, chosen, alignment = outcome.skeletons, outcome.chosen, outcome.alignment
     if not skeletons:
         raise SolveError(f"{settings.input}: no instant could be solved; is any segment of an arm in it?")
     forward = skeletons[-1].forward
     if settings.out is not None:
-        result = tabulate(skeletons, times_ns, times_s, settings.groups)
+        result = tabulate(skeletons, outcome.times_ns, outcome.times_s, settings.groups)
         table.write(
             settings.out,
             result.columns,
@@ -178,10 +161,10 @@ def _finish(
                 "input": settings.input.name,
                 "filter": chosen.filter,
                 "magnetometer": chosen.magnetometer,
-                "mode": "live",
+                "mode": settings.mode,
                 "forward": forward,
                 "origin": skeletons[-1].origin,
-                **(metadata or {}),
+                **outcome.metadata,
             },
         )
     quality: dict[str, Counter[str]] = {}
@@ -190,15 +173,19 @@ def _finish(
         for segment, pose in skeleton.segments.items():
             if segment != "sternum" or skeleton.side == first:  # both arms name the one sternum
                 quality.setdefault(segment, Counter())[pose.quality] += 1
+    live = outcome.live
     return SolveReport(
         rows=len({s.time_ns for s in skeletons}),
         sides=sorted({s.side for s in skeletons}),
         filter=chosen.filter,
         forward=forward,
         quality={segment: dict(counts) for segment, counts in quality.items()},
-        drops=dict(drops),
-        warnings=warnings,
-        scores=scores,
+        drops=dict(outcome.drops),
+        warnings=outcome.warnings,
+        scores={} if alignment is None else alignment.scores,
+        mode=settings.mode,
+        parts=outcome.parts,
+        refused=outcome.refused | ({} if alignment is None else alignment.refused),
         live_compared=live[0] if live else 0,
         live_angle_rad=live[1] if live else None,
         live_position_m=live[2] if live else None,

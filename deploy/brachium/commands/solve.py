@@ -31,6 +31,12 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--filter", help="auto, vqf, complementary or complementary-printed (default: as live)"
     )
+    parser.add_argument(
+        "--mode",
+        choices=("live", "best"),
+        default="live",
+        help="live: what the live service would give; best: from the whole recording, past and future",
+    )
     parser.add_argument("--no-mag", action="store_true", help="leave magnetometers aside")
     parser.add_argument(
         "--rate", type=real(1.0, 1000.0), metavar="HZ", help="instants a second (default: as the input)"
@@ -57,6 +63,7 @@ def run(args: argparse.Namespace) -> int:
             filter=args.filter,
             magnetometer=not args.no_mag,
             rate_hz=args.rate,
+            mode=args.mode,
             groups=_groups(args.columns, GROUPS),
         )
     )
@@ -101,7 +108,8 @@ def _groups(text: str | None, known: "tuple[Group, ...]") -> "tuple[Group, ...]"
 
 def _words(source: Path, report: "SolveReport") -> str:
     lines = [
-        f"{source}: {report.rows} instants, {' and '.join(report.sides)}, filter {report.filter}",
+        f"{source}: {report.rows} instants, {' and '.join(report.sides)}, "
+        + (f"filter {report.filter}" if report.mode == "live" else "best of the whole recording"),
         f"forward: {report.forward}",
     ]
     for segment, counts in report.quality.items():
@@ -109,6 +117,8 @@ def _words(source: Path, report: "SolveReport") -> str:
     if report.live_compared:
         lines.append(f"beside {report.live_compared} live skeletons: {_beside_live(report)}")
     lines += [f"not used: {count} ({reason})" for reason, count in report.drops.items()]
+    lines += [f"{part.replace('_', ' ')}: {words}" for part, words in report.parts.items()]
+    lines += [f"refused, {what.replace('_', ' ')}: {reason}" for what, reason in report.refused.items()]
     lines += [f"warning: {warning}" for warning in report.warnings]
     if report.out is not None:
         lines.append(f"wrote {report.out}")
