@@ -4,12 +4,14 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from brachium.evaluation import (
+    alignment_tables,
     arm_tables,
     detection,
     long_run,
     recording_tables,
     sensor_sets,
     tsilomitrou_tables,
+    wear_tables,
     zhou_limits,
     zhou_tables,
 )
@@ -38,6 +40,12 @@ CATALOGUE: tuple[Entry, ...] = (
     Entry(name="loss", shows="5 % loss in bursts", make=arm_tables.loss),
     Entry(name="long-run", shows="half an hour: growth, disturbed field, no magnetometer",
           make=long_run.long_run),
+    Entry(name="alignment", shows="axes and heading from the calibration routine",
+          make=alignment_tables.alignment),
+    Entry(name="contracture", shows="an elbow that stops at 35 deg", make=alignment_tables.contracture),
+    Entry(name="refusals", shows="calibration movements that cannot be used", make=alignment_tables.refusals),
+    Entry(name="wear-check", shows="200 wearers: right, swapped, turned, arms exchanged",
+          make=wear_tables.wear),
     Entry(name="tsilomitrou", shows="Tables 4 and 5 of Tsilomitrou et al. 2021",
           make=tsilomitrou_tables.places),
     Entry(name="tsilomitrou-angles", shows="joint angles in its three experiments",
