@@ -144,6 +144,24 @@ ON_SKIN = Sizes(
 """A strap settles by a degree or two; a joint's full movement turns the skin beside it by a few degrees."""
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class ShoulderEstimate:
+    """The shoulder after one sample; world axes."""
+
+    shift_m: Floats
+    """(3,) displacement since the start; 0 while not valid."""
+    covariance: Floats
+    """(3, 3) m^2."""
+    world_from_upper: Floats
+    """(4,) of the upper arm's sensor as if it sat as the model says."""
+    world_from_forearm: Floats
+    """(4,) of the forearm's."""
+    at_rest: bool
+    valid: bool
+    reason: str
+    """Why not; empty while valid."""
+
+
 def sizes(model: ArmModel) -> Sizes:
     """Return the sizes of the errors of an arm's sensors."""
     return ON_SKIN if model.soft_tissue else ON_BONE
@@ -156,3 +174,12 @@ def cross_matrix(v: Floats) -> Floats:
     m[..., 1, 0], m[..., 1, 2] = v[..., 2], -v[..., 0]
     m[..., 2, 0], m[..., 2, 1] = -v[..., 1], v[..., 0]
     return m
+
+
+def levelled(world_from_sensor: Floats, acc: Floats) -> Floats:
+    """Return the orientation (4,) turned the shortest way so that `acc` (3,), of a sensor at rest, is up."""
+    up = rotation.rotate(world_from_sensor, acc)
+    axis = np.array([up[1], -up[0], 0.0])
+    across = float(np.hypot(up[0], up[1]))
+    turn = axis / max(across, 1e-12) * np.arctan2(across, up[2])
+    return rotation.multiply(rotation.from_rotation_vector(turn), world_from_sensor)

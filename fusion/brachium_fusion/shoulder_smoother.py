@@ -11,7 +11,7 @@ import numpy as np
 from brachium_body import rotation
 from brachium_fusion import shoulder_increments as si
 from brachium_fusion.shoulder_equations import POSTURES, SIZE
-from brachium_fusion.shoulder_model import FARTHEST_M, ArmModel, Bools, Floats, Sizes, sizes
+from brachium_fusion.shoulder_model import FARTHEST_M, ArmModel, Bools, Floats, Sizes, levelled, sizes
 from brachium_fusion.shoulder_postures import Postures
 from brachium_fusion.shoulder_window import Known, carried, samples, solve
 
@@ -104,15 +104,6 @@ def _begin(size: Sizes, held: list[Floats], orientations: Pair) -> Known:
     one = np.repeat([size.gyro_bias, size.accel_bias, size.gyro_scale, size.accel_scale], 3)
     sd = np.concatenate([one, one, np.full(6, size.mounting), np.full(POSTURES - 30, size.tissue)])
     return Known(np.array(world), np.zeros(SIZE), knot_sd, constants, sd, sd)
-
-
-def levelled(world_from_sensor: Floats, acc: Floats) -> Floats:
-    """Return the orientation (4,) turned the shortest way so that `acc` (3,), of a sensor at rest, is up."""
-    up = rotation.rotate(world_from_sensor, acc)
-    axis = np.array([up[1], -up[0], 0.0])
-    across = float(np.hypot(up[0], up[1]))
-    turn = axis / max(across, 1e-12) * np.arctan2(across, up[2])
-    return rotation.multiply(rotation.from_rotation_vector(turn), world_from_sensor)
 
 
 def _padded(values: Floats, every: int) -> Floats:

@@ -80,7 +80,7 @@ def solve(
     world, constants, shift = known.world_from, known.constants * LINEARISED, size.shift
     place: Floats | None = None
     for number in range(PASSES):
-        fitted = _fitted(model, constants)
+        fitted = fitted_model(model, constants)
         errors = constants[: si.SITS_UPPER].reshape(2, 4, 3)
         read = [si.Sensor(*filled[2 * i : 2 * i + 2], *errors[i]).corrected() for i in range(2)]
         sensors = np.stack([si.strapdown(read[i][0], world[i], period) for i in range(2)])
@@ -127,7 +127,7 @@ def _beside(missing: Bools) -> Bools:
     return beside
 
 
-def _fitted(model: ArmModel, constants: Floats) -> ArmModel:
+def fitted_model(model: ArmModel, constants: Floats) -> ArmModel:
     """Return the model with both sensors sitting as the constants say."""
     upper, forearm = rotation.from_rotation_vector(constants[si.SITS_UPPER : si.CONSTANTS].reshape(2, 3))
     return replace(

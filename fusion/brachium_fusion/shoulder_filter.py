@@ -1,0 +1,247 @@
+"""The shoulder as it moves: its displacement and both sensors' orientations from the samples so far. Pure.
+
+The same model as the smoother's, as an error-state Kalman filter: samples are integrated one by one, errors
+and covariances go from knot to knot.
+"""
+
+from typing import Any
+
+import numpy as np
+
+from brachium_body import rotation
+from brachium_fusion import shoulder_hearing as hearing
+from brachium_fusion import shoulder_increments as si
+from brachium_fusion.shoulder_equations import (
+    MISSING_TURN,
+    NEAR_REST_S,
+    PLACE,
+    SIZE,
+    SPEED,
+    TURNS,
+)
+from brachium_fusion.shoulder_errors import ErrorState
+from brachium_fusion.shoulder_model import ArmModel, Floats, ShoulderEstimate, Sizes, levelled, sizes
+from brachium_fusion.shoulder_strapdown import Ahead
+from brachium_fusion.shoulder_watch import Watch
+from brachium_fusion.shoulder_window import fitted_model
+
+LONGEST_GAP_S = 1.0
+"""After a longer one nothing is known of the shoulder until the next rest."""
+UNKNOWN_M = 0.1
+LOST_HEADING = 0.1
+"""rad: of each sensor after a time that made no sense."""
+SITS_CONSTANTS = slice(si.SITS_UPPER, si.CONSTANTS)
+
+
+class ShoulderFilter:
+    """Follows one arm from a rest on; `step` takes both sensors' samples of one instant."""
+
+    def __init__(
+        self,
+        model: ArmModel,
+        rate_hz: float,
+        world_from_upper: Floats,
+        world_from_forearm: Floats,
+        gyro_bias_upper: Floats,
+        gyro_bias_forearm: Floats,
+        *,
+        heading_sd_rad: float | None = None,
+    ) -> None:
+        self._model, self._period, self._every = model, 1.0 / rate_hz, si.stride(rate_hz)
+        self._size: Sizes = sizes(model)
+        self._heading_sd = heading_sd_rad
+        self._world: Floats = np.stack([world_from_upper, world_from_forearm]).astype(np.float64)
+        self._constants = np.zeros(si.CONSTANTS)
+        self._constants[0:3], self._constants[12:15] = gyro_bias_upper, gyro_bias_forearm
+        self._errors = ErrorState(self._size)
+        self._watch = Watch(self._size, self._world.copy())
+        self._place, self._speed = np.zeros(3), np.zeros(3)
+        self._ahead = Ahead(self._period)
+        self._at_rest = True
+        self._stand()
+
+    def step(
+        self,
+        gyr_u: Floats,
+        acc_u: Floats,
+        gyr_f: Floats,
+        acc_f: Floats,
+        *,
+        trunk_velocity: Floats | None = None,
+        world_from_upper: Floats | None = None,
+        world_from_forearm: Floats | None = None,
+        missing_s: float = 0.0,
+    ) -> ShoulderEstimate:
+        """Return the shoulder after one sample of each sensor: rad/s and m/s^2 in its axes, calibrated.
+
+        `trunk_velocity` (3,) m/s, world, is the trunk's part of the shoulder's velocity; give it always or
+        never. `world_from_upper` and `world_from_forearm` (4,) are the sensors' orientations by an
+        orientation filter: they stand in while the estimate is not valid, and give heading when the filter
+        was told how well they know it. `missing_s` is the time without samples before this one, beyond the
+        period.
+        """
+        given = None
+        if world_from_upper is not None and world_from_forearm is not None:
+            given = np.stack([world_from_upper, world_from_forearm]).astype(np.float64)
+        if missing_s > 0.0:
+            self._gap(missing_s)
+        trunk = np.zeros(3) if trunk_velocity is None else trunk_velocity
+        self._ahead.add(np.concatenate([gyr_u, acc_u, gyr_f, acc_f, trunk]).tolist())
+        if len(self._ahead.rows) == self._every + 1:
+            self._knot(given)
+        return self._estimate(given)
+
+    def _stand(self) -> None:
+        """Begin to look ahead from what is held at the knot."""
+        c = self._constants[: si.SITS_UPPER].reshape(2, 4, 3)
+        self._scale, self._bias = (1.0 - c[:, 2:]).reshape(12), c[:, :2].reshape(12)
+        self._now = fitted_model(self._model, self._constants)
+        self._ahead.begin(
+            self._world.ravel().tolist(),
+            self._scale.tolist(),
+            self._bias.tolist(),
+            self._now.lever_upper.tolist(),
+            self._speed.tolist(),
+        )
+
+    def _knot(self, given: Floats | None) -> None:
+        """Take the interval that ended."""
+        rows = np.array(self._ahead.rows)
+        h = self._every * self._period
+        read = rows[:, 8:20] * self._scale - self._bias
+        inc = si.increments(
+            self._now,
+            self._period,
+            self._every,
+            (rows[:, 0:4], read[:, 0:3], read[:, 3:6]),
+            (rows[:, 4:8], read[:, 6:9], read[:, 9:12]),
+            rows[:, 20:23],
+        )
+        self._world = rows[-1, :8].reshape(2, 4)
+        fastest = float(np.sqrt(np.square(read.reshape(-1, 4, 3)[:, ::2]).sum(axis=2).max()))
+        watch, errors = self._watch, self._errors
+        self._at_rest = watch.see(inc.velocity[0], fastest, h)
+        listen = not watch.reason
+        sits = self._constants[si.SITS_UPPER :]
+        near = watch.since_rest_s < NEAR_REST_S
+        if listen and self._at_rest:
+            rates = read.mean(axis=0).reshape(4, 3)[::2].ravel()
+            hearing.rest(errors, self._size, self._speed, rates, watch.rest_s, h)
+        moving = 1.0 if near else watch.shift / self._size.shift
+        apart = errors.advance(inc, moving, sits, listen=listen)
+        if listen:
+            self._place = self._place + h * self._speed
+            self._hear(h, given)
+            sd = np.sqrt(np.diag(errors.covariance)[PLACE])
+            watch.judge(self._place, self._speed, sd, apart, h)
+        if watch.reason:
+            self._lost(given)
+            if watch.recovered():
+                self._begin_again(rows[:, 8:20].mean(axis=0))
+        self._stand()
+
+    def _hear(self, h: float, given: Floats | None) -> None:
+        """Hear what holds at a knot."""
+        size, watch, errors = self._size, self._watch, self._errors
+        near = watch.since_rest_s < NEAR_REST_S
+        variance = (2.0 * size.shift) ** 2 * 60.0 if near else watch.shift**2 * size.shift_s
+        hearing.elbow_and_place(errors, size, self._now, self._world, self._place, variance / h, h)
+        if given is not None and self._heading_sd is not None:
+            hearing.heading(errors, self._world, given, self._heading_sd, h)
+        self._take()
+        if self._at_rest:
+            sd = np.sqrt(np.diag(errors.covariance)[PLACE])
+            posture = watch.tie(self._world, self._place, sd)
+            if posture is not None:
+                hearing.back(errors, size, posture, self._world, self._place)
+                self._take()
+
+    def _take(self) -> None:
+        """Take the mean of the errors into what is held."""
+        x = self._errors.take()
+        self._place, self._speed = self._place + x[PLACE], self._speed + x[SPEED]
+        turn = rotation.from_rotation_vector(x[TURNS].reshape(2, 3))
+        self._world = rotation.normalize(rotation.multiply(turn, self._world))
+        self._constants = self._constants + x[SIZE:]
+        self._now = fitted_model(self._model, self._constants)
+
+    def _gap(self, missing_s: float) -> None:
+        """Go over a time without samples: what moved in it is not known."""
+        ahead = self._ahead
+        if ahead.rows:
+            self._world = np.array(ahead.rows[-1][:8]).reshape(2, 4)
+            self._place = self._place + np.array(ahead.moved[:3])
+            self._speed = self._speed + np.array(ahead.moved[3:])
+        ahead.rows = []
+        variance = np.repeat([0.5 * missing_s**2, 1.0, MISSING_TURN**2], 3)
+        self._errors.widen(slice(0, 9), variance * missing_s**2)
+        self._errors.widen(slice(9, 12), variance[6:] * missing_s**2)
+        if missing_s > LONGEST_GAP_S:
+            self._watch.stop("samples were missing for too long")
+        self._stand()
+
+    def _lost(self, given: Floats | None) -> None:
+        """Hold nothing of the shoulder; orientations are the orientation filter's, if it is there."""
+        self._place, self._speed = np.zeros(3), np.zeros(3)
+        self._errors.take()
+        self._errors.forget(slice(0, 6), np.repeat([UNKNOWN_M, 1.0], 3))
+        if given is not None:
+            self._world = given
+
+    def _begin_again(self, measured: Floats) -> None:
+        """Begin at a rest: level both sensors by their accelerations (12,) = gyr, acc, gyr, acc."""
+        size = self._size
+        for i in range(2):
+            c = self._constants[12 * i : 12 * i + 12]
+            acc = measured[6 * i + 3 : 6 * i + 6] * (1.0 - c[9:12]) - c[3:6]
+            self._world[i] = levelled(self._world[i], acc)
+        knot = np.repeat([size.shift, size.rest_speed], 3)
+        self._errors.forget(slice(0, 12), np.concatenate([knot, [size.tilt, size.tilt, LOST_HEADING] * 2]))
+
+    def _estimate(self, given: Floats | None) -> ShoulderEstimate:
+        ahead, reason = self._ahead, self._watch.reason
+        world = np.array(ahead.rows[-1][:8]).reshape(2, 4) if ahead.rows else self._world
+        if reason and given is not None:
+            world = given
+        else:
+            world = rotation.multiply(
+                world, rotation.from_rotation_vector(self._constants[SITS_CONSTANTS].reshape(2, 3))
+            )
+        since = self._period * max(len(ahead.rows) - 1, 0)
+        covariance = self._errors.covariance
+        cross = covariance[PLACE, SPEED] * since
+        spread = covariance[PLACE, PLACE] + cross + cross.T + covariance[SPEED, SPEED] * since**2
+        return ShoulderEstimate(
+            np.zeros(3) if reason else self._place + np.array(ahead.moved[:3]),
+            spread,
+            world[0],
+            world[1],
+            self._at_rest,
+            not reason,
+            reason,
+        )
+
+    def state(self) -> dict[str, Any]:
+        """Return all that changes, as plain values."""
+        return {
+            "world": self._world.tolist(),
+            "constants": self._constants.tolist(),
+            "place": self._place.tolist(),
+            "speed": self._speed.tolist(),
+            "at_rest": self._at_rest,
+            "rows": [list(row) for row in self._ahead.rows],
+            "moved": list(self._ahead.moved),
+            "errors": self._errors.state(),
+            "watch": self._watch.state(),
+        }
+
+    def restore(self, state: dict[str, Any]) -> None:
+        """Go on as the filter of the same arm whose state this is would have."""
+        self._world, self._constants = np.array(state["world"]), np.array(state["constants"])
+        self._place, self._speed = np.array(state["place"]), np.array(state["speed"])
+        self._at_rest = state["at_rest"]
+        self._errors.restore(state["errors"])
+        self._watch.restore(state["watch"])
+        self._ahead.rows = [list(row) for row in state["rows"]][-1:]
+        self._stand()
+        self._ahead.restore([list(row) for row in state["rows"]], list(state["moved"]))
