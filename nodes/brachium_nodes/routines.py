@@ -9,12 +9,26 @@ _BENT = {"elbow_flexion": 90.0}
 _LOW, _HIGH = {"elbow_flexion": 8.0}, {"elbow_flexion": 110.0}
 _SUPINE, _PRONE = {**_BENT, "forearm_pronation": -55.0}, {**_BENT, "forearm_pronation": 55.0}
 
+_SHOULDER = {
+    "shoulder_flexion": (0.0, 12.0),
+    "shoulder_abduction": (0.0, 8.0),
+    "shoulder_rotation": (-8.0, 8.0),
+}
+_RAISING = {
+    "shoulder_flexion": (-5.0, 20.0),
+    "shoulder_abduction": (-5.0, 15.0),
+    "shoulder_rotation": (-10.0, 10.0),
+    "elbow_flexion": (0.0, 15.0),
+    "forearm_pronation": (-15.0, 15.0),
+}
+"""Nobody keeps the shoulder where it was, or raises an arm straight to the side."""
+
 
 def _functional(script: Script) -> Routine:
     script.repeat("elbow-flexion", _LOW, _HIGH)
     script.repeat("pronation", _SUPINE, _PRONE)
     script.mix(10.0)
-    return script.end()
+    return script.end(_SHOULDER)
 
 
 def calibration(build: Build) -> Routine:
@@ -44,7 +58,7 @@ def shrugged_calibration(build: Build) -> Routine:
     script, along = Script(), {"shift_up": 0.05, "shoulder_flexion": 40.0, "shoulder_abduction": 25.0}
     script.repeat("elbow-flexion", _LOW, {**_HIGH, **along})
     script.repeat("pronation", _SUPINE, {**_PRONE, **along})
-    return script.end()
+    return script.end(_SHOULDER)
 
 
 def small_calibration(build: Build) -> Routine:
@@ -53,7 +67,7 @@ def small_calibration(build: Build) -> Routine:
     script = Script()
     script.repeat("elbow-flexion", _LOW, {"elbow_flexion": 16.0})
     script.repeat("pronation", {**_BENT, "forearm_pronation": -4.0}, {**_BENT, "forearm_pronation": 4.0})
-    return script.end()
+    return script.end(_SHOULDER)
 
 
 def mixed_up_calibration(build: Build) -> Routine:
@@ -63,7 +77,7 @@ def mixed_up_calibration(build: Build) -> Routine:
     both = {"elbow_flexion": 100.0, "forearm_pronation": 50.0}
     script.repeat("elbow-flexion", {"elbow_flexion": 10.0, "forearm_pronation": -50.0}, both)
     script.repeat("pronation", {"elbow_flexion": 10.0, "forearm_pronation": -50.0}, both)
-    return script.end()
+    return script.end(_SHOULDER)
 
 
 def restless_calibration(build: Build) -> Routine:
@@ -75,7 +89,7 @@ def restless_calibration(build: Build) -> Routine:
     script.span("n-pose", 1.5)
     script.repeat("elbow-flexion", _LOW, _HIGH)
     script.repeat("pronation", _SUPINE, _PRONE)
-    return script.end(sway_deg=12.0)
+    return script.end(_SHOULDER, sway_deg=12.0)
 
 
 def wear_check(build: Build) -> Routine:
@@ -83,13 +97,13 @@ def wear_check(build: Build) -> Routine:
     del build
     script = Script()
     script.span("hang", -3.0)
-    for kind, there in (("raise", {"shoulder_abduction": 75.0}), ("bend", {"elbow_flexion": 100.0})):
+    for kind, there in (("raise", {"shoulder_abduction": 75.0}), ("bend", {"elbow_flexion": 95.0})):
         begin = script.now
-        script.go(1.5, there)
+        script.go(1.5, {"sway": 1.0, **there})
         script.wait(0.5)
         script.go(1.5, {"posed": 1.0})
         script.span(kind, begin)
-    return script.end(rest_s=0.5)
+    return script.end(_RAISING, rest_s=0.5)
 
 
 def nothing(build: Build) -> Routine:

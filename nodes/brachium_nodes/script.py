@@ -65,8 +65,10 @@ class Routine:
     moves: tuple[Move, ...] = ()
     spans: tuple[Span, ...] = ()
     seconds: float = 0.0
-    sway_deg: float = 0.5
+    sway_deg: float = 2.0
     """Standard deviation of the shoulder's angles where it moves along."""
+    habit_deg: Mapping[str, tuple[float, float]] = field(default_factory=dict[str, tuple[float, float]])
+    """Where it does, each person is off by so much, from and to, in a way of their own."""
     sway_hz: tuple[float, float] = (0.05, 0.4)
 
     def __call__(self, t: Array, variation: Variation, build: Build) -> Posture:
@@ -79,6 +81,9 @@ class Routine:
                 done = done * variation.extent(np.array(float(move.repetition)))
             for name, change in move.change.items():
                 values[name] += change * done
+        for name, (low, high) in self.habit_deg.items():
+            own = variation.uniform(f"routine/{name}/habit", np.zeros(1))[0]
+            values[name] += values["sway"] * (low + (high - low) * own)
         for name, error in build.pose_error_deg.items():
             values[name] += error * values["posed"]
         for name in ANGLES[:3] if values["sway"].any() else ():
@@ -162,10 +167,16 @@ class Script:
         self.go(1.0, {})
         self.span("free", begin)
 
-    def end(self, rest_s: float = 3.0, sway_deg: float = 0.5) -> Routine:
+    def end(
+        self, habit_deg: Mapping[str, tuple[float, float]], rest_s: float = 3.0, sway_deg: float = 2.0
+    ) -> Routine:
         """Go back to neutral, rest, and return the routine."""
         self.go(1.5, {"posed": 1.0})
         self.wait(rest_s)
         return Routine(
-            moves=tuple(self._moves), spans=tuple(self._spans), seconds=self.now, sway_deg=sway_deg
+            moves=tuple(self._moves),
+            spans=tuple(self._spans),
+            seconds=self.now,
+            sway_deg=sway_deg,
+            habit_deg=habit_deg,
         )

@@ -119,7 +119,7 @@ def test_only_a_level_with_pose_errors_holds_neutral_wrong() -> None:
 
 def test_bad_calibrations_are_bad_in_their_way() -> None:
     good, shrugged = person("calibration"), person("calibration-shrugged")
-    assert np.ptp(angle(good, "shoulder_flexion", span(good, "elbow-flexion"))) < 4.0
+    assert np.ptp(angle(good, "shoulder_flexion", span(good, "elbow-flexion"))) < 20.0
     assert np.ptp(angle(shrugged, "shoulder_flexion", span(shrugged, "elbow-flexion"))) > 35.0
     small = person("calibration-small")
     assert np.ptp(angle(small, "elbow_flexion", span(small, "elbow-flexion"))) < 9.0
@@ -137,9 +137,16 @@ def test_the_wear_check_hangs_raises_and_bends_within_ten_seconds() -> None:
     assert [s.kind for s in (hang, lift, bend)] == ["hang", "raise", "bend"]
     assert bend.to_s - hang.from_s == pytest.approx(10.0)
     assert np.ptp(angle(one, "shoulder_abduction", hang)) == 0.0
-    assert np.ptp(angle(one, "shoulder_abduction", lift)) == pytest.approx(75.0, abs=0.1)
-    assert np.ptp(angle(one, "elbow_flexion", bend)) == pytest.approx(100.0, abs=0.1)
-    assert np.ptp(angle(one, "shoulder_abduction", bend)) == 0.0
+    lifted, bent = [], []
+    for seed in range(30):
+        one = person("wear-check", seed=seed)
+        lifted.append([np.ptp(angle(one, name, lift)) for name in ("shoulder_abduction", "shoulder_flexion")])
+        bent.append([np.ptp(angle(one, name, bend)) for name in ("elbow_flexion", "shoulder_abduction")])
+    assert np.min(lifted, axis=0)[0] > 60.0
+    assert np.max(lifted, axis=0)[1] < 35.0
+    assert np.min(bent, axis=0)[0] > 90.0
+    assert np.max(bent, axis=0)[1] < 30.0
+    assert np.std(lifted, axis=0).min() > 3.0  # people do it differently
 
 
 def test_the_other_arm_waits_in_neutral() -> None:
