@@ -124,11 +124,8 @@ class JointEquations:
     def noise(self, guess: Guess) -> tuple[float, float]:
         """Return the factors by which both equations' residuals differ from RATE_SD and ANGLE_SD."""
         first, second, _ = self._residuals(guess)
-        sizes = (np.sqrt(np.mean(self.loss(first))), np.sqrt(np.mean(self.loss(second))))
-        rate, angle = (
-            max(LEAST_NOISE, before * float(x)) for before, x in zip(self._noise, sizes, strict=True)
-        )
-        return rate, angle
+        size = max(LEAST_NOISE, self._noise[0] * float(np.sqrt(np.mean(self.loss(first)))))
+        return size, size
 
     def unexplained(self, guess: Guess) -> float:
         """Return the rms of the rate across both axes over the rms of the joint's rate."""
