@@ -1,16 +1,16 @@
 """A capture folder through the pipeline: the spans that calibrate it first, then every sample. Pure."""
 
 from collections.abc import Iterator, Sequence
-from typing import NamedTuple
+from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
 
-from brachium_body import rotation
-from brachium_body.segments import Segment, part_of
+from brachium_body.segments import Segment
 from brachium_fusion.best_material import Material, TimedSpan
 from brachium_fusion.pipeline import Pipeline
-from brachium_fusion.pose import Alignment
+from brachium_fusion.pose import POSES, Alignment
+from brachium_fusion.sensor_to_segment import SensorRecord, Span, align_segments
 from brachium_fusion.session_terms import check_session
 from brachium_fusion.settings import Settings
 from brachium_fusion.subject import Subject
@@ -25,6 +25,8 @@ SUBJECT = "capture"
 ZERO_NS = 1_000_000_000_000_000
 """Host time given to t = 0 of a capture, so that times are positive whatever its t."""
 BATCH = 16
+FREE_S = 30.0
+"""Where only movement can tell the headings and none is stated, that of so long after the pose is used."""
 
 
 def nanoseconds(t: npt.ArrayLike) -> npt.NDArray[np.int64]:
@@ -66,11 +68,6 @@ def session(capture: Capture) -> Session:
 
 def material(capture: Capture) -> Material:
     """Return what `--mode best` starts from."""
-    spans, start = capture.settings.calibration, _start(capture)
-    timed = [TimedSpan(kind=f.motion, from_s=start + f.from_s, to_s=start + f.to_s) for f in spans.functional]
-    if spans.pose is not None and spans.to_s is not None:
-        begin_s, end_s = start + (spans.from_s or 0.0), start + spans.to_s
-        timed.insert(0, TimedSpan(kind=spans.pose, from_s=begin_s, to_s=end_s, angles_deg=spans.angles_deg))
     return Material(
         series={
             name: Series(
@@ -81,10 +78,29 @@ def material(capture: Capture) -> Material:
         infos=infos(capture),
         sequences={name: np.arange(len(data.t)) for name, data in capture.segments.items()},
         session=session(capture),
-        spans=tuple(timed),
+        spans=_timed(capture),
         stated=stated(capture),
         zero_ns=ZERO_NS,
         warnings=capture.warnings,
+    )
+
+
+def _timed(capture: Capture) -> tuple[TimedSpan, ...]:
+    """Return the spans that capture.toml states, in its own time, the pose first."""
+    spans, start = capture.settings.calibration, _start(capture)
+    timed = [TimedSpan(kind=f.motion, from_s=start + f.from_s, to_s=start + f.to_s) for f in spans.functional]
+    if spans.pose is not None and spans.to_s is not None:
+        begin_s, end_s = start + (spans.from_s or 0.0), start + spans.to_s
+        pose = TimedSpan(kind=spans.pose, from_s=begin_s, to_s=end_s, angles_deg=spans.angles_deg)
+        timed.insert(0, pose)
+    return tuple(timed)
+
+
+def _loose(capture: Capture) -> bool:
+    """Return whether only movement can tell how some sensors' headings are to one another."""
+    return any(
+        data.quat is None and data.mag is None and name not in capture.settings.mounting
+        for name, data in capture.segments.items()
     )
 
 
@@ -176,65 +192,41 @@ def _begin(subject: Subject, capture: Capture, instants: Sequence[int]) -> None:
         subject.inform(segment, info)
 
 
-class _Held(NamedTuple):
-    times_ns: list[int]
-    quats: list[Floats]
-
-
 def _alignment(capture: Capture, settings: Settings) -> Alignment | None:
     """Return what the calibration spans give, or None when there are none: filters run up to their end."""
-    spans = capture.settings.calibration
-    if spans.pose is None or spans.to_s is None:
+    spans = _timed(capture)
+    if not any(span.kind in POSES for span in spans):
         return None
-    start = _start(capture)
-    pose_span = (start + (spans.from_s or 0.0), start + spans.to_s)
-    elbow_spans = [
-        (start + f.from_s, start + f.to_s) for f in spans.functional if f.motion == "elbow-flexion"
-    ]
-    end = max([pose_span[1], *(to for _, to in elbow_spans)])
-    subject = Subject(settings, lambda _: None)
+    if len(spans) == 1 and _loose(capture):
+        spans += (TimedSpan(kind="free", from_s=spans[0].to_s, to_s=spans[0].to_s + FREE_S),)
+    subject = Subject(replace(settings, joints=False), lambda _: None)
     times = output_times(capture, None)
-    _begin(subject, capture, nanoseconds(times[times <= end]).tolist())
-    pose: dict[str, list[Floats]] = {}
-    moving: dict[str, _Held] = {}
-    for fed, samples in batches(capture, end):
+    end_s = max(span.to_s for span in spans)
+    wanted = times[times <= end_s + 1e-9]
+    _begin(subject, capture, nanoseconds(wanted).tolist())
+    row_of = {time_ns: row for row, time_ns in enumerate(nanoseconds(wanted).tolist())}
+    quats = {name: np.full((len(wanted), 4), np.nan) for name in capture.segments}
+    for fed, samples in batches(capture, end_s):
         subject.feed(fed, samples)
         for instant in subject.instants():
-            at_s = (instant.time_ns - ZERO_NS) * 1e-9
             for name, reading in instant.readings.items():
-                if reading is None:
-                    continue
-                if pose_span[0] - 1e-9 <= at_s <= pose_span[1]:
-                    pose.setdefault(name, []).append(reading.after)
-                if part_of(name) == "forearm" and any(a <= at_s <= b for a, b in elbow_spans):
-                    held = moving.setdefault(name, _Held([], []))
-                    held.times_ns.append(instant.time_ns)
-                    held.quats.append(reading.after)
-    if not pose:
-        return None
-    held_pose = {name: np.array(quats) for name, quats in pose.items()}
-    axes = {
-        name: flexion_axis(
-            np.array(held.quats), np.array(held.times_ns) * 1e-9, rotation.mean(held_pose[name])
+                if reading is not None:
+                    quats[name][row_of[instant.time_ns]] = reading.after  # type: ignore[index]
+    records = {
+        name: SensorRecord(
+            world_from_sensor=quats[name],
+            magnetometer=track.magnetometer or track.info.orientation_only,
+            nominal_mounting=None if track.info.mounting is None else np.array(track.info.mounting),
         )
-        for name, held in moving.items()
-        if name in held_pose and len(held.quats) > 1
+        for name, track in subject.tracks.items()
     }
-    subject.take_alignment(subject.received_ns, held_pose, spans.pose, dict(spans.angles_deg), axes)
-    return subject.alignment
-
-
-def flexion_axis(world_from_sensor: Floats, time_s: Floats, in_pose: Floats) -> Floats:
-    """Return the axis (3,) of elbow flexion in the forearm sensor's world, pointing to the subject's right.
-
-    From orientations (n, 4) during repeated flexion, time_s (n,), and the one (4,) in the pose, arm hanging:
-    the axis about which it turned most; its sign is the one with which the forearm rises.
-    """
-    step = rotation.multiply(world_from_sensor[1:], rotation.inverse(world_from_sensor[:-1]))
-    rate = rotation.to_rotation_vector(step) / np.diff(time_s)[:, None]
-    _, vectors = np.linalg.eigh(rate.T @ rate)
-    axis: Floats = vectors[:, -1]
-    up_in_sensor = rotation.rotate(rotation.inverse(in_pose), np.array([0.0, 0.0, 1.0]))
-    proximal = rotation.rotate(world_from_sensor, up_in_sensor)
-    rising = -np.diff(proximal[:, 2])  # the proximal axis leaves the vertical as the forearm rises
-    return axis if float(rising @ (rate @ axis)) >= 0.0 else -axis
+    rows = [
+        Span(kind=span.kind, first=first, end=last, angles_deg=dict(span.angles_deg))  # type: ignore[arg-type]
+        for span in spans
+        for first, last in [np.searchsorted(wanted, [span.from_s - 1e-9, span.to_s + 1e-9]).tolist()]
+        if first < last
+    ]
+    if not rows:
+        return None
+    rate_hz = 1.0 / float(np.median(np.diff(wanted)))
+    return align_segments(records, rows, rate_hz, facing_deg=capture.settings.facing_deg)

@@ -170,7 +170,7 @@ def test_another_filter_solves_the_same_recording_to_other_numbers(messages, tmp
         name: solve(SolveSettings(input=tmp_path / "a.mcap", filter=name))
         for name in (None, "complementary", "complementary-printed")
     }
-    assert reports[None].filter == "vqf"
+    assert reports[None].filter == "auto"
     for name in ("complementary", "complementary-printed"):
         assert reports[name].filter == name
         assert reports[name].live_compared == 0
