@@ -12,7 +12,7 @@ from brachium_nodes.magnetism import Surroundings
 from brachium_nodes.movement import Array, Variation, minimum_jerk
 from brachium_nodes.person import NEUTRAL_S, TRANSITION_S, Person
 from brachium_nodes.places import Place, place
-from brachium_nodes.sensors import GRAVITY, Errors, generator
+from brachium_nodes.sensors import FIELD_UT, GRAVITY, Errors, generator
 from brachium_nodes.wearing import TURNS, Wearing
 from brachium_wire.messages import Quaternion
 
@@ -135,7 +135,9 @@ class Worn:
         return q, point
 
     def _field(self, t: Array, point: Array, person: Person) -> Array:
-        """Return the magnetic field (n, 3) uT, world axes, at the sensor's places (n, 3) m."""
+        """Return the field (n, 3), or (3,) where it is one, uT, world axes, at places (n, 3) m."""
+        if self.surroundings == UNDISTURBED:
+            return FIELD_UT
         chest = person.trunk(np.zeros(1)).chest
         return self.surroundings.field_ut(t, point - chest, Variation(self.seed, self.segment))
 
