@@ -15,8 +15,8 @@ RATE_SD = 0.04
 """rad/s: of the first equation when nearly still; skin and timing."""
 RATE_SHARE = 0.05
 """Of both sensors' rates: what skin adds to the first equation in movement."""
-ANGLE_SD = radians(27.0)
-"""Of the second equation: 3 deg of tilt and skin, and neighbouring instants that err together."""
+ANGLE_SD = radians(15.0)
+"""Of the second equation: 3 deg of tilt and skin, which do not change from one instant to the next."""
 INDEPENDENT = 6.0
 """All instants together count as so many independent ones: skin's errors follow the movement, and
 repeating it repeats them."""

@@ -12,7 +12,7 @@ Floats = npt.NDArray[np.float64]
 
 ROWS_HZ = 10.0
 """Instants kept: movement of arms is below 5 Hz, and skin's wobble above it."""
-SMOOTH_S = 0.2
+SMOOTH_S = 0.1
 """Rates and forces are averaged over about so long."""
 MOST_ROWS = 1500
 KNOT_S = 15.0
