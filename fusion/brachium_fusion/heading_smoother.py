@@ -144,7 +144,7 @@ def _solve(
     corner_right = flat_weighted.T @ residual.ravel() - prior * shared
     solved = solveh_banded(band, right, check_finite=False)
     coupled = right[:, 1:].T @ solved
-    shared_change: Floats = np.linalg.solve(corner - coupled[:, 1:], corner_right - coupled[:, 0])
+    shared_change = np.linalg.solve(corner - coupled[:, 1:], corner_right - coupled[:, 0]).astype(np.float64)
     change: Floats = solved[:, 0] - solved[:, 1:] @ shared_change
     return change, shared_change
 

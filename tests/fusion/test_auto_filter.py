@@ -178,6 +178,33 @@ def test_begun_in_movement_it_finds_its_heading() -> None:
     assert errors_deg(quats, truth[200:])[1000:].max() < 3.0
 
 
+def test_a_magnet_on_the_sensor_is_found_from_the_movement() -> None:
+    truth, gyr, acc, mag = turning(10, 120.0)
+    mag = mag + np.array([9.0, -10.0, 6.0])
+    ours = errors_deg(AutoFilter(1.0 / RATE, True).update(gyr, acc, mag, None), truth)
+    theirs = errors_deg(vqf(gyr, acc, mag), truth)
+    assert rms(ours[:500]) > 5.0  # nothing can tell before it moves
+    assert rms(ours[6000:]) < 1.0
+    assert rms(ours[6000:]) < 0.2 * rms(theirs[6000:])
+
+
+def test_the_sway_of_a_stander_is_no_bias() -> None:
+    """1 deg about 0.3 Hz, with a gyroscope as quiet as a good one: 0.005 (deg/s)/sqrt(Hz)."""
+    random = np.random.default_rng(11)
+    n = int(120.0 * RATE)
+    narrow = butter(2, [0.15, 0.45], btype="band", fs=RATE, output="sos")
+    angles = sosfiltfilt(narrow, random.normal(0.0, 1.0, (n, 3)), axis=0)
+    angles *= np.radians(1.0) / angles.std(axis=0) * np.clip(np.arange(n) / RATE - 3.0, 0.0, 1.0)[:, None]
+    truth = Rotation.from_rotvec(angles)
+    gyr = np.vstack([np.zeros(3), (truth[:-1].inv() * truth[1:]).as_rotvec() * RATE])
+    gyr += random.normal(0.0, np.radians(0.005) * np.sqrt(RATE / 2.0), (n, 3))
+    acc = np.ascontiguousarray(truth.inv().apply(UP)) + random.normal(0.0, 0.03, (n, 3))
+    ours = errors_deg(AutoFilter(1.0 / RATE, False).update(gyr, acc, None, None), truth)
+    theirs = errors_deg(VQF(1.0 / RATE).updateBatch(gyr, acc)["quat6D"], truth)
+    assert ours.max() < 0.5
+    assert ours.max() < 0.3 * theirs.max()
+
+
 @pytest.mark.data
 def test_real_recordings_come_out_better_than_by_vqf() -> None:
     names = [path.name for path in sorted(DATA.glob("broad_*"))] if DATA.is_dir() else []
