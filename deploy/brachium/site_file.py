@@ -45,6 +45,8 @@ class Room(_Table, frozen=True, kw_only=True):
     services: tuple[ServiceName, ...] = ("router", "gateway", "fuse", "record")
     recordings: str = "recordings"
     """Folder of the recorder."""
+    calibrations: str = "calibrations"
+    """Folder of the nodes' sensor calibrations, as `brachium sensor --out` writes it."""
     password: bool | None = None
     """Ask for the room's password; left out: beyond loopback, yes."""
 

@@ -57,6 +57,8 @@ def services(site: Site, path: Path, *, join_token: str, users_file: Path | None
     words["gateway"] += [
         "--site",
         str(path),
+        "--calibrations",
+        room.calibrations,
         "--join-token-sha256",
         hashlib.sha256(join_token.encode()).hexdigest(),
     ]

@@ -171,7 +171,7 @@ class Conversation:
             chip=frame.chip,
             firmware=frame.firmware,
             mounting=answer.entry.mounting,
-            calibration=frame.calibration,
+            calibration=answer.calibration,
             magnetometer=frame.magnetometer,
             orientation_only=frame.orientation_only,
         )

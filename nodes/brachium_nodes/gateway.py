@@ -2,12 +2,12 @@
 
 import asyncio
 import hashlib
-import ipaddress
 import logging
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass
 from http import HTTPStatus
+from pathlib import Path
 
 from websockets.asyncio.server import ServerConnection, serve
 from websockets.http11 import Request, Response
@@ -16,6 +16,8 @@ from brachium_nodes.assign_command import serve_assign
 from brachium_nodes.connection import Connection
 from brachium_nodes.conversation import Conversation
 from brachium_nodes.host_claim import HostClaims, checked_host
+from brachium_nodes.known_calibrations import calibrations_in
+from brachium_nodes.listening import CannotListen, listening_address, why_not
 from brachium_nodes.node_frames import MAX_FRAME_BYTES, Hello
 from brachium_nodes.roster import Admission, NodeEntry, Refusal, Roster
 from brachium_wire import keys
@@ -29,10 +31,6 @@ log = logging.getLogger(__name__)
 
 PATH = "/node"
 STOP_LOOK_S = 0.05
-
-
-class CannotListen(RuntimeError):
-    """The address or port cannot be had; the text says which and what to do."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -49,6 +47,8 @@ class GatewaySettings:
     nodes: tuple[NodeEntry, ...] = ()
     join_token_sha256: str | None = None
     """A token with which new nodes may knock; they wait until they are assigned."""
+    calibrations: Path | None = None
+    """Folder of sensor calibrations, one file a node: for nodes that bring none of their own."""
 
 
 def token_sha256(token: str) -> str:
@@ -58,9 +58,9 @@ def token_sha256(token: str) -> str:
 
 def run(settings: GatewaySettings, stop: threading.Event) -> None:
     """Serve nodes until `stop` is set. Raises CannotListen, BadKey, ValueError or NoRouter, each one line."""
-    address = _address(settings.bind)
+    address = listening_address(settings.bind)
     checked_host(settings.id)
-    roster = Roster(settings.nodes, settings.join_token_sha256)
+    roster = Roster(settings.nodes, settings.join_token_sha256, calibrations_in(settings.calibrations))
     with Bus.open(settings.endpoint, stop=stop) as bus:
         asyncio.run(Gateway(bus, settings, roster).serve(address, stop))
 
@@ -98,7 +98,7 @@ class Gateway:
         try:
             listening = await server
         except OSError as error:
-            raise CannotListen(_why(error, address, settings.port)) from None
+            raise CannotListen(why_not(error, address, settings.port)) from None
         async with listening:
             port = listening.sockets[0].getsockname()[1]
             self._heart = Heart(self._bus, settings.room, "gateway", settings.id)
@@ -232,19 +232,3 @@ def _presented(request: Request) -> str:
     """Return the SHA-256 of the bearer token of a request."""
     kind, _, token = request.headers.get("Authorization", "").partition(" ")
     return token_sha256(token.strip() if kind.lower() == "bearer" else "")
-
-
-def _address(bind: str) -> str:
-    try:
-        address = ipaddress.ip_address(bind)
-    except ValueError:
-        raise CannotListen(f"--bind {bind!r} is no address; write one, as 127.0.0.1") from None
-    if address.is_unspecified:
-        raise CannotListen(f"--bind {bind} would listen everywhere; give the address of one interface")
-    return str(address)
-
-
-def _why(error: OSError, address: str, port: int) -> str:
-    if "in use" in str(error):
-        return f"port {port} of {address} is in use: another gateway is running, or choose another --port"
-    return f"the gateway cannot listen at {address} port {port}: {error.strerror or error}"

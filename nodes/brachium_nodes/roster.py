@@ -1,13 +1,14 @@
 """Who may join and for whom it stands. A value: no socket, no clock, no bus."""
 
 import hmac
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from brachium_body.segments import SEGMENTS
 from brachium_nodes.node_frames import MAX_RATE_HZ, Hello, RefusalCode
 from brachium_nodes.sample_stream import Memory, SegmentMemory
 from brachium_wire import keys
-from brachium_wire.messages import Quaternion
+from brachium_wire.messages import Quaternion, SensorCalibration
 
 MAX_WAITING = 64
 """Unknown nodes that are remembered; more than a room holds are not a mistake but an attack."""
@@ -37,6 +38,8 @@ class Admission:
     place: SegmentMemory
     replaces: bool
     """An older connection of the same node is still open."""
+    calibration: SensorCalibration
+    """The node's own, or what was fitted before for a node that brings none."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,7 +54,13 @@ class Refusal:
 class Roster:
     """The node table with who is connected, who waits, and what is remembered."""
 
-    def __init__(self, entries: tuple[NodeEntry, ...], join_token_sha256: str | None = None) -> None:
+    def __init__(
+        self,
+        entries: tuple[NodeEntry, ...],
+        join_token_sha256: str | None = None,
+        calibration_of: Callable[[str], SensorCalibration] = lambda _: SensorCalibration(),
+    ) -> None:
+        self._calibration_of = calibration_of
         self._entries: dict[str, NodeEntry] = {}
         for entry in entries:
             if entry.id in self._entries:
@@ -115,7 +124,10 @@ class Roster:
         self._connected[hello.node] = place
         self._waiting.pop(hello.node, None)
         where = self._places.setdefault(place, SegmentMemory())
-        return Admission(entry, entry.subject, entry.segment, memory, where, replaces)
+        calibration = hello.calibration
+        if calibration == SensorCalibration():
+            calibration = self._calibration_of(hello.node)
+        return Admission(entry, entry.subject, entry.segment, memory, where, replaces, calibration)
 
     def subject_of(self, node: str) -> str | None:
         """Return the subject a node is assigned to."""

@@ -29,6 +29,12 @@ def configure(parser: argparse.ArgumentParser) -> None:
         help="nodes with this token may knock and wait to be assigned",
     )
     parser.add_argument(
+        "--calibrations",
+        type=Path,
+        metavar="DIR",
+        help="sensor calibrations that brachium sensor kept, for nodes that bring none",
+    )
+    parser.add_argument(
         "--assign",
         metavar="ID=SUBJECT/SEGMENT",
         help="tell the running gateway whom a node belongs to, and end",
@@ -50,6 +56,7 @@ def run(args: argparse.Namespace) -> int:
         port=args.port,
         nodes=_entries(args.site),
         join_token_sha256=args.join_token_sha256,
+        calibrations=args.calibrations,
     )
     return serve(lambda stop: gateway.run(settings, stop))
 

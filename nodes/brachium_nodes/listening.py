@@ -1,0 +1,25 @@
+"""Where a service of nodes listens: one interface, never all."""
+
+import ipaddress
+
+
+class CannotListen(RuntimeError):
+    """The address or port cannot be had; the text says which and what to do."""
+
+
+def listening_address(bind: str) -> str:
+    """Return the address of one interface, or raise CannotListen."""
+    try:
+        address = ipaddress.ip_address(bind)
+    except ValueError:
+        raise CannotListen(f"--bind {bind!r} is no address; write one, as 127.0.0.1") from None
+    if address.is_unspecified:
+        raise CannotListen(f"--bind {bind} would listen everywhere; give the address of one interface")
+    return str(address)
+
+
+def why_not(error: OSError, address: str, port: int) -> str:
+    """Return why an address and port cannot be had."""
+    if "in use" in str(error):
+        return f"port {port} of {address} is in use: another gateway is running, or choose another --port"
+    return f"the gateway cannot listen at {address} port {port}: {error.strerror or error}"
