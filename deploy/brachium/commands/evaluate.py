@@ -26,6 +26,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--table", action="append", default=[], metavar="NAME", help="only this one; repeat")
     parser.add_argument("--list", action="store_true", help="list the tables, and end")
     parser.add_argument("--quick", action="store_true", help="one seed, shorter: a look, not a figure")
+    parser.add_argument("--gate", action="store_true", help="the few figures that a test holds, as JSON")
     parser.add_argument("--markdown", action="store_true", help="print sections of a page")
     parser.add_argument("--out", type=Path, metavar="FILE", help="write what is printed there, too")
     add_json(parser)
@@ -46,6 +47,11 @@ def run(args: argparse.Namespace) -> int:
     if args.list:
         print("\n".join(f"{entry.name:<22}{entry.shows}" for entry in entries))
         return 0
+    if args.gate:
+        from brachium.evaluation.gate import figures
+
+        _give(as_json(figures()), args.out)
+        return 0
     context = Context(
         levels=tuple(args.level),
         seeds=tuple(range(1, 2 if args.quick else args.seeds + 1)),
@@ -59,11 +65,14 @@ def run(args: argparse.Namespace) -> int:
             context.progress(f"{entry.name}: left out, it needs recordings (give --data)")
             continue
         made += entry.make(context)
-    text = said(made, context.seeds, as_json_text=args.json, markdown=args.markdown)
-    if args.out is not None:
-        args.out.write_text(text + "\n", encoding="utf-8")
-    print(text)
+    _give(said(made, context.seeds, as_json_text=args.json, markdown=args.markdown), args.out)
     return 0
+
+
+def _give(text: str, out: Path | None) -> None:
+    if out is not None:
+        out.write_text(text + "\n", encoding="utf-8")
+    print(text)
 
 
 def said(made: "list[Table]", seeds: tuple[int, ...], *, as_json_text: bool, markdown: bool) -> str:

@@ -37,7 +37,7 @@ def alignment(context: Context) -> list[Table]:
         for carrying in CARRYING_DEG:
             label = f"{level}, {abs(carrying):g} deg {'valgus' if carrying > 0 else 'varus'}"
             context.progress(f"alignment: {label}")
-            cells = context.over_seeds_each(partial(_errors, context, level, carrying))
+            cells = context.over_seeds_each(partial(errors, context, level, carrying))
             rows.append((label, tuple(cells)))
             if level in LIMITED:
                 i = LIMITED.index(level)
@@ -64,7 +64,8 @@ def alignment(context: Context) -> list[Table]:
     ]
 
 
-def _errors(context: Context, level: Level, carrying_deg: float, seed: int) -> list[float | None]:
+def errors(context: Context, level: Level, carrying_deg: float, seed: int) -> list[float | None]:
+    """Return the errors by COLUMNS of one wearer, None where the elbow was refused."""
     trial = Trial(
         exercise="elbow-flexion",
         level=level,

@@ -11,7 +11,7 @@ from brachium.evaluation.emulated import Emulated, Estimate
 from brachium.evaluation.errors import angle_error, rms
 from brachium.evaluation.solving import word
 from brachium.evaluation.tables import Cell, Limit, Table
-from brachium.evaluation.trials import Trial
+from brachium.evaluation.trials import GUIDED, Trial
 from brachium_nodes.sensors import Level
 
 RATES_HZ = (25.0, 50.0)
@@ -71,8 +71,6 @@ GOALS: tuple[Goal, ...] = (
     ),
     Goal("reaching: shoulder", "reaching", shoulder_mm, "mm"),
     Goal("shrug: wrist", "shrugging", place_mm("wrist"), "mm"),
-    Goal("protraction: shoulder", "protraction", shoulder_mm, "mm"),
-    Goal("free movement: wrist", "free", place_mm("wrist"), "mm"),
 )
 LIMITED: tuple[Level, ...] = ("ideal", "typical")
 
@@ -84,10 +82,9 @@ def arm(context: Context) -> list[Table]:
 
 def _arm(context: Context, level: Level) -> Table:
     columns = [(rate, method) for rate in RATES_HZ for method in METHODS]
-    goals = GOALS[:7] if context.quick else GOALS
     rows: list[tuple[str, tuple[Cell, ...]]] = []
     limits: list[Limit] = []
-    for goal in goals:
+    for goal in GOALS:
         context.progress(f"arm, {level}: {goal.label}")
         cells: list[Cell] = []
         for rate, method in columns:
@@ -111,12 +108,16 @@ def _arm(context: Context, level: Level) -> Table:
         columns=tuple(f"{rate:g} Hz {word(method)}" for rate, method in columns),
         rows=tuple(rows),
         limits=tuple(limits),
-        notes=(f"Emulated right arm, median of seeds {', '.join(map(str, context.seeds))}.",),
+        notes=(
+            "Calibrated by the guided routine first: standing, elbow flexions, pronations, both. Emulated "
+            f"right arm, median of seeds {', '.join(map(str, context.seeds))}.",
+        ),
     )
 
 
 def _value(context: Context, goal: Goal, level: Level, rate: float, method: str, seed: int) -> float | None:
-    made = context.emulated(Trial(exercise=goal.exercise, level=level, seed=seed, rate_hz=rate))
+    trial = Trial(exercise=goal.exercise, level=level, seed=seed, rate_hz=rate, routine=GUIDED)
+    made = context.emulated(trial)
     return goal.figure(made, made.solved(method))
 
 
@@ -138,9 +139,9 @@ def loss(context: Context) -> list[Table]:
         for exercise, column in LOSS_ANGLES:
             context.progress(f"loss, {level}: {exercise}")
             for method in ("auto", "best"):
+                seed = context.seeds[0]
                 whole, lossy = (
-                    context.over_seeds(partial(_lossy, context, exercise, column, level, method, part))
-                    for part in (0.0, LOSS)
+                    _lossy(context, exercise, column, level, method, part, seed) for part in (0.0, LOSS)
                 )
                 ratio = None if not whole or lossy is None else lossy / whole
                 label = f"{exercise}: {column}, {level}, {word(method)}"
@@ -157,7 +158,8 @@ def loss(context: Context) -> list[Table]:
             limits=tuple(limits),
             notes=(
                 "Each sensor loses its own samples. A gap of up to 100 ms is bridged; in a longer one the "
-                "segment is missing and its rows do not count.",
+                "segment is missing and its rows do not count. "
+                f"Seed {context.seeds[0]} alone.",
             ),
         )
     ]
@@ -166,6 +168,7 @@ def loss(context: Context) -> list[Table]:
 def _lossy(
     context: Context, exercise: str, column: str, level: Level, method: str, part: float, seed: int
 ) -> float | None:
-    trial = Trial(exercise=exercise, level=level, seed=seed, loss=part, burst=BURST if part else 1)
+    burst = BURST if part else 1
+    trial = Trial(exercise=exercise, level=level, seed=seed, routine=GUIDED, loss=part, burst=burst)
     made = context.emulated(trial)
     return angle_deg(column)(made, made.solved(method))

@@ -14,11 +14,11 @@ from brachium.evaluation.trials import Trial
 
 Floats = npt.NDArray[np.float64]
 
-RATE_HZ, SECONDS = 25.0, 60.0
+RATE_HZ, SECONDS = 25.0, 120.0
 PERIOD_S = 4.0
 """One repetition of either exercise: one trial."""
 FALSE_ALARMS, SEEN = 0.05, 0.95
-EXTENTS = (0.01, 0.02, 0.04, 0.06, 0.1, 0.15, 0.25, 0.4, 0.7, 1.0)
+EXTENTS = (0.01, 0.02, 0.04, 0.08, 0.15, 0.3, 0.6, 1.0)
 METHODS = ("Zhou, drift reset", "live", "best")
 
 Signal = Callable[[Estimate], Floats]
@@ -79,7 +79,7 @@ def _smallest(
 def _ranges(context: Context, exercise: str, signal: Signal, method: str, extent: float) -> Floats:
     """Return how far the estimate goes up and down in each repetition of all seeds."""
     found = []
-    for seed in context.seeds:
+    for seed in context.seeds[:1]:
         trial = Trial(
             exercise=exercise,
             level="typical",

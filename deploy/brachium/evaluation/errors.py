@@ -61,8 +61,12 @@ def eq17(estimate: Floats, reference: Floats) -> NormFigures | None:
     return NormFigures(float(apart.mean()), float(apart.max()), float(np.sqrt((apart**2).mean())))
 
 
+FEWEST_MEANS = 3
+"""Wilcoxon's test says nothing of fewer."""
+
+
 def _wilcoxon(means: Sequence[float]) -> float | None:
-    if len(means) <= 5 or not any(means):
+    if len(means) < FEWEST_MEANS or not any(means):
         return None
     result: Any = stats.wilcoxon(means)
     return float(result.pvalue)

@@ -9,7 +9,7 @@ from brachium.evaluation.emulated import Emulated, Estimate
 from brachium.evaluation.errors import angle_error, relative_angle, rms
 from brachium.evaluation.solving import word
 from brachium.evaluation.tables import Cell, Limit, Table
-from brachium.evaluation.trials import Trial
+from brachium.evaluation.trials import GUIDED, Trial
 from brachium_body.segments import arm_segments
 
 RATE_HZ, SECONDS, QUICK_SECONDS = 25.0, 1800.0, 240.0
@@ -24,14 +24,14 @@ class Setting(NamedTuple):
     words: str
     magnetometer: bool
     disturbance_ut: float
+    methods: tuple[str, ...]
 
 
 SETTINGS: tuple[Setting, ...] = (
-    Setting("9 axes", True, 0.0),
-    Setting("9 axes, field disturbed by 8 uT", True, 8.0),
-    Setting("6 axes", False, 0.0),
+    Setting("9 axes", True, 0.0, ("auto", "best")),
+    Setting("9 axes, field disturbed by 8 uT", True, 8.0, ("vqf", "auto", "best")),
+    Setting("6 axes", False, 0.0, ("auto", "best")),
 )
-METHODS = ("vqf", "auto", "best")
 
 
 def long_run(context: Context) -> list[Table]:
@@ -45,11 +45,12 @@ def long_run(context: Context) -> list[Table]:
             seed=context.seeds[0],
             rate_hz=RATE_HZ,
             seconds=QUICK_SECONDS if context.quick else SECONDS,
+            routine=GUIDED,
             magnetometer=setting.magnetometer,
             disturbance_ut=setting.disturbance_ut,
         )
         made = Emulated(trial)  # not kept: it is large
-        for method in METHODS:
+        for method in setting.methods:
             context.progress(f"long run: {setting.words}, {method}")
             found = made.solved(method)
             first, last = (_figures(made, found, at_end=at_end) for at_end in (False, True))

@@ -1,23 +1,20 @@
-"""An emulated optical tracker: markers at 200 Hz, brought down to the sensors' rate (Zhou 2008, 2.3.2)."""
+"""What an emulated optical tracker says of an arm's joints, at the sensors' rate (Zhou 2008, 2.3.2). Pure."""
 
 from dataclasses import dataclass
-from math import sqrt
 
 import numpy as np
 import numpy.typing as npt
-from scipy import signal
 
 from brachium.evaluation.emulated import Emulated
-from brachium_body.angles import INDEX
-from brachium_nodes.wearer import Wearer
+from brachium_body import rotation
+from brachium_body.angles import INDEX, joint_angles
+from brachium_nodes.optical import optical_record
 
 Floats = npt.NDArray[np.float64]
 
-RATE_HZ = 200.0
-MARKER_M = 0.0003
-"""Standard deviation of a marker's place per axis: active markers at some metres; an assumption."""
-WAND_M = 0.05
-"""Length of the wand whose two markers show how the forearm is turned."""
+EPICONDYLE_M, WRIST_M = 0.035, 0.025
+"""From the markers on lateral epicondyle and wrist inwards to the joints' centres, along the wands: as a
+laboratory measures it on each person."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -26,30 +23,44 @@ class Tracked:
 
     places: dict[str, Floats]
     """shoulder, elbow, wrist in trunk axes from the chest, (n, 3) m."""
-    elbow_flexion: Floats
-    """(n,) rad, from the three places: 0 when they lie in a line."""
-    forearm_pronation: Floats
-    """(n,) rad, from the forearm's wand."""
+    angles: dict[str, Floats]
+    """elbow_flexion and forearm_pronation, (n,) rad."""
 
 
 def track(made: Emulated) -> Tracked:
-    """Return what the tracker saw of one trial; the markers' noise is drawn from its seed."""
-    trial, n = made.trial, len(made.session.time_s)
-    down = round(RATE_HZ / trial.rate_hz)
-    truth = Wearer(trial.settings()).truth(np.arange(n * down) / RATE_HZ, trial.side)
-    random = np.random.default_rng([trial.seed, round(RATE_HZ)])
+    """Return what the tracker saw of one trial, the trunk being still.
 
-    def seen(true: Floats, sd: float) -> Floats:
-        noisy = true + sd * random.standard_normal(true.shape)
-        # The filter is symmetric and delays nothing; at its edges the person stands still.
-        return np.asarray(signal.resample_poly(noisy, 1, down, axis=0, padtype="line"))[:n]
-
-    places = {name: seen(truth.positions[name], MARKER_M) for name in ("shoulder", "elbow", "wrist")}
-    upper, fore = places["elbow"] - places["shoulder"], places["wrist"] - places["elbow"]
-    cosine = (upper * fore).sum(axis=1) / np.linalg.norm(upper, axis=1) / np.linalg.norm(fore, axis=1)
-    turn = np.unwrap(truth.angles[:, INDEX["forearm_pronation"]])
+    The shoulder's centre is the acromion's marker less what lies between them at rest.
+    """
+    trial, session = made.trial, made.session
+    n = len(session.time_s)
+    record = optical_record(trial.settings(), trial.side, n / trial.rate_hz).resampled(round(trial.rate_hz))
+    markers = {name: places[:n] for name, places in record.markers.items()}
+    upper_wand = _unit(markers["upper_arm_wand"] - markers["lateral_epicondyle"])
+    fore_wand = _unit(markers["forearm_wand"] - markers["wrist"])
+    elbow = markers["lateral_epicondyle"] - EPICONDYLE_M * upper_wand
+    wrist = markers["wrist"] - WRIST_M * fore_wand
+    still = slice(0, round(trial.rate_hz))
+    acromion = markers["acromion"]
+    shoulder = acromion - (acromion[still] - made.truth.world_positions["shoulder"][still]).mean(axis=0)
+    outward = 1.0 if trial.side == "right" else -1.0
+    upper = _frame(shoulder - elbow, outward * upper_wand)
+    fore = _frame(elbow - wrist, outward * fore_wand)
+    unknown = np.full((n, 4), np.nan)
+    angles = joint_angles(unknown, rotation.multiply(rotation.inverse(upper), fore), unknown, trial.side)
     return Tracked(
-        places,
-        np.arccos(np.clip(cosine, -1.0, 1.0)),
-        seen(turn, sqrt(2.0) * MARKER_M / WAND_M),
+        {"shoulder": shoulder, "elbow": elbow, "wrist": wrist},
+        {name: np.unwrap(angles[:, INDEX[name]]) for name in ("elbow_flexion", "forearm_pronation")},
     )
+
+
+def _frame(along: Floats, across: Floats) -> Floats:
+    """Return world_from_segment (n, 4) whose Y lies along one direction and whose Z is near another."""
+    y = _unit(along)
+    z = _unit(across - y * (across * y).sum(axis=1, keepdims=True))
+    return rotation.from_matrix(np.stack([np.cross(y, z), y, z], axis=-1))
+
+
+def _unit(v: Floats) -> Floats:
+    unit: Floats = v / np.sqrt((v * v).sum(axis=1, keepdims=True))
+    return unit

@@ -1,8 +1,9 @@
 """A table of figures: what it shows, its columns and rows, and which of them have a limit. Pure."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from statistics import median
+from typing import Any
 
 Cell = float | str | None
 """A figure, a word, or nothing: not measured."""
@@ -76,6 +77,29 @@ class Table:
             ],
             "notes": list(self.notes),
         }
+
+    @classmethod
+    def from_plain(cls, plain: Mapping[str, Any]) -> "Table":
+        """Return the table that `plain` told."""
+        columns = tuple(plain["columns"])
+        return cls(
+            name=plain["name"],
+            title=plain["title"],
+            unit=plain["unit"],
+            columns=columns,
+            rows=tuple((row["label"], tuple(row[column] for column in columns)) for row in plain["rows"]),
+            limits=tuple(
+                Limit(
+                    what=limit["what"],
+                    value=limit["value"],
+                    at_most=limit["limit"],
+                    unit=limit["unit"],
+                    at_least=limit["least"],
+                )
+                for limit in plain["limits"]
+            ),
+            notes=tuple(plain["notes"]),
+        )
 
     def text(self) -> str:
         """Return the table for a terminal."""

@@ -21,6 +21,8 @@ from brachium_wire.messages import Vector
 
 Floats = npt.NDArray[np.float64]
 
+GUIDED = "calibration"
+"""The routine that a wearer with two sensors or more is led through first."""
 STANDING = (0.5, 3.5)
 """From when to when, of standing in neutral, the pose is taken, s."""
 

@@ -20,7 +20,7 @@ Floats = npt.NDArray[np.float64]
 
 METHODS = ("printed", "corrected", "vqf", "auto", "best")
 WORDS = tuple(word(method) for method in METHODS)
-RATE_HZ, SECONDS, QUICK_SECONDS = 50.0, 60.0, 20.0
+RATE_HZ, SECONDS, QUICK_SECONDS = 50.0, 30.0, 20.0
 
 
 class Experiment(NamedTuple):

@@ -15,7 +15,7 @@ from brachium_nodes.wearer import WearerSettings
 from brachium_nodes.wearing import TURNS, Turn, Wearing
 
 WEARERS, QUICK_WEARERS = 200, 20
-RATE_HZ = 50.0
+RATE_HZ = 25.0
 KINDS = ("as it should be", "two on one arm swapped", "one turned", "arms exchanged", "swapped and turned")
 
 

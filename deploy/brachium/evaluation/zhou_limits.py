@@ -17,6 +17,7 @@ from brachium_fusion.zhou import CORRECTED, MEAN_OF_BOTH, PRINTED, Erratum, Zhou
 from brachium_nodes.places import Arrangement
 
 RATE_HZ = 25.0
+COLUMNS = ("shrug: shoulder", "reaching: shoulder", "reaching: wrist", "reaching: elbow flexion")
 SHORT: Mapping[Erratum, str] = {
     "Z2": "lengths the right way round",
     "Z3": "R stays a rotation",
@@ -37,14 +38,14 @@ def errata(context: Context) -> list[Table]:
     rows: list[tuple[str, tuple[Cell, ...]]] = []
     for label, settings in readings.items():
         context.progress(f"zhou errata: {label}")
-        cells = context.over_seeds_each(partial(_errors, context, settings))
+        cells = context.over_seeds_each(partial(errors, context, settings))
         rows.append((label, tuple(cells)))
     return [
         Table(
             name="zhou-errata",
             title="The system of Zhou et al. 2008, erratum by erratum, ideal",
             unit="mm 3-D RMS, deg RMS, over whole repetitions",
-            columns=("shrug: shoulder", "reaching: shoulder", "reaching: wrist", "reaching: elbow flexion"),
+            columns=COLUMNS,
             rows=tuple(rows),
             notes=(
                 "20 s at 25 Hz. Drift is reset in each repetition where it is not said to be left in. Lambda "
@@ -54,7 +55,8 @@ def errata(context: Context) -> list[Table]:
     ]
 
 
-def _errors(context: Context, settings: ZhouSettings, seed: int) -> list[float | None]:
+def errors(context: Context, settings: ZhouSettings, seed: int) -> list[float | None]:
+    """Return the errors by COLUMNS of one wearer."""
     figures: list[float | None] = []
     for exercise in ("shrugging", "reaching"):
         made = context.emulated(Trial(exercise=exercise, level="ideal", seed=seed, rate_hz=RATE_HZ))
@@ -158,7 +160,7 @@ def arrangements(context: Context) -> list[Table]:
     seconds = 20.0 if context.quick else REALLOCATION_S
     for arrangement, words in ARRANGEMENTS.items():
         context.progress(f"zhou places: {arrangement}")
-        cells = context.over_seeds_each(partial(_placed, context, arrangement, seconds))
+        cells = _placed(context, arrangement, seconds, context.seeds[0])
         rows.append((words, tuple(cells)))
     return [
         Table(
