@@ -23,6 +23,8 @@ POSTURES = si.CONSTANTS + UNKNOWNS
 EXACT_M = 2e-5
 """m: of the displacement that speed makes between knots."""
 NEAR_REST_S = 2.5
+BROKEN = 1.0
+"""m and m/s: by how much a person who walks may be elsewhere, and faster, a knot later."""
 GONE = 1e3
 """Times the noise of an interval with samples missing."""
 MISSING_TURN = 0.5
@@ -61,6 +63,8 @@ class Stretch:
     """(k + 1,)."""
     missing: Bools
     """(k,) intervals in which samples were missing."""
+    broken: Bools
+    """(k,) intervals in which more moves than a shoulder: nothing is expected of it there."""
     tissue: Tissue
 
 
@@ -97,6 +101,7 @@ def _movement(
     for rows in (slice(3, 6), slice(6, 9), slice(9, 12)):
         begin[:, rows, SPEED], end[:, rows, SPEED] = -eye, eye
     sd[:, 3:6] = sizes.shoulder_accel * (shift / sizes.shift) * sqrt(h)
+    sd[stretch.broken, :6] = BROKEN
     begin[:, 6:12, TURNS], end[:, 6:12, TURNS] = -inc.by_turn[:, :, :6], -inc.by_turn[:, :, 6:]
     constant[:, 6:12, : si.CONSTANTS] = -inc.by_constant
     constant[:, 9:12, TISSUE] = -stretch.tissue.velocity_by_tissue(model, world_upper, stretch.upper_rate, h)

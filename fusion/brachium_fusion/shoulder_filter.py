@@ -20,12 +20,12 @@ from brachium_fusion.shoulder_equations import (
     TURNS,
 )
 from brachium_fusion.shoulder_errors import ErrorState
-from brachium_fusion.shoulder_model import ArmModel, Floats, ShoulderEstimate, Sizes, levelled, sizes
+from brachium_fusion.shoulder_model import ArmModel, Floats, ShoulderEstimate, Sizes, sizes
 from brachium_fusion.shoulder_strapdown import Ahead
 from brachium_fusion.shoulder_watch import Watch
 from brachium_fusion.shoulder_window import fitted_model
 
-LONGEST_GAP_S = 1.0
+LONGEST_GAP_S = 0.3
 """After a longer one nothing is known of the shoulder until the next rest."""
 UNKNOWN_M = 0.1
 LOST_HEADING = 0.1
@@ -57,7 +57,7 @@ class ShoulderFilter:
         self._watch = Watch(self._size, self._world.copy())
         self._place, self._speed = np.zeros(3), np.zeros(3)
         self._ahead = Ahead(self._period)
-        self._at_rest = True
+        self._at_rest, self._settled = True, False
         self._stand()
 
     def step(
@@ -74,22 +74,25 @@ class ShoulderFilter:
     ) -> ShoulderEstimate:
         """Return the shoulder after one sample of each sensor: rad/s and m/s^2 in its axes, calibrated.
 
-        `trunk_velocity` (3,) m/s, world, is the trunk's part of the shoulder's velocity; give it always or
-        never. `world_from_upper` and `world_from_forearm` (4,) are the sensors' orientations by an
-        orientation filter: they stand in while the estimate is not valid, and give heading when the filter
-        was told how well they know it. `missing_s` is the time without samples before this one, beyond the
-        period.
+        `trunk_velocity` (3,) m/s, world, is the trunk's part of the shoulder's velocity: always or never.
+        `world_from_upper` and `world_from_forearm` (4,) are an orientation filter's: they stand in while the
+        estimate is not valid, and give heading if the filter was told how well they know it. `missing_s` is
+        the time without samples before this one, beyond the period.
         """
         given = None
         if world_from_upper is not None and world_from_forearm is not None:
             given = np.stack([world_from_upper, world_from_forearm]).astype(np.float64)
-        if missing_s > 0.0:
-            self._gap(missing_s)
         trunk = np.zeros(3) if trunk_velocity is None else trunk_velocity
-        self._ahead.add(np.concatenate([gyr_u, acc_u, gyr_f, acc_f, trunk]).tolist())
+        row = np.concatenate([gyr_u, acc_u, gyr_f, acc_f, trunk])
+        if missing_s > 0.0:
+            self._gap(missing_s, row, given)
+        self._feed(row, given)
+        return self._estimate(given)
+
+    def _feed(self, row: Floats, given: Floats | None) -> None:
+        self._ahead.add(row.tolist())
         if len(self._ahead.rows) == self._every + 1:
             self._knot(given)
-        return self._estimate(given)
 
     def _stand(self) -> None:
         """Begin to look ahead from what is held at the knot."""
@@ -107,6 +110,11 @@ class ShoulderFilter:
     def _knot(self, given: Floats | None) -> None:
         """Take the interval that ended."""
         rows = np.array(self._ahead.rows)
+        if not self._settled:
+            self._settled = True
+            self._settle(rows)
+            self._stand()
+            return
         h = self._every * self._period
         read = rows[:, 8:20] * self._scale - self._bias
         inc = si.increments(
@@ -118,15 +126,16 @@ class ShoulderFilter:
             rows[:, 20:23],
         )
         self._world = rows[-1, :8].reshape(2, 4)
-        fastest = float(np.sqrt(np.square(read.reshape(-1, 4, 3)[:, ::2]).sum(axis=2).max()))
+        rates = read.mean(axis=0).reshape(4, 3)[::2]
+        fastest = float(np.sqrt(np.square(rates).sum(axis=1).max()))
         watch, errors = self._watch, self._errors
-        self._at_rest = watch.see(inc.velocity[0], fastest, h)
+        slow = hearing.slow(errors, self._size, self._speed, h)
+        self._at_rest = watch.see(inc.velocity[0], fastest, h, slow=slow)
         listen = not watch.reason
         sits = self._constants[si.SITS_UPPER :]
         near = watch.since_rest_s < NEAR_REST_S
         if listen and self._at_rest:
-            rates = read.mean(axis=0).reshape(4, 3)[::2].ravel()
-            hearing.rest(errors, self._size, self._speed, rates, watch.rest_s, h)
+            hearing.rest(errors, self._size, self._speed, rates.ravel(), watch.rest_s, h)
         moving = 1.0 if near else watch.shift / self._size.shift
         apart = errors.advance(inc, moving, sits, listen=listen)
         if listen:
@@ -137,7 +146,7 @@ class ShoulderFilter:
         if watch.reason:
             self._lost(given)
             if watch.recovered():
-                self._begin_again(rows[:, 8:20].mean(axis=0))
+                self._begin_again(rows)
         self._stand()
 
     def _hear(self, h: float, given: Floats | None) -> None:
@@ -165,20 +174,17 @@ class ShoulderFilter:
         self._constants = self._constants + x[SIZE:]
         self._now = fitted_model(self._model, self._constants)
 
-    def _gap(self, missing_s: float) -> None:
-        """Go over a time without samples: what moved in it is not known."""
-        ahead = self._ahead
-        if ahead.rows:
-            self._world = np.array(ahead.rows[-1][:8]).reshape(2, 4)
-            self._place = self._place + np.array(ahead.moved[:3])
-            self._speed = self._speed + np.array(ahead.moved[3:])
-        ahead.rows = []
-        variance = np.repeat([0.5 * missing_s**2, 1.0, MISSING_TURN**2], 3)
-        self._errors.widen(slice(0, 9), variance * missing_s**2)
-        self._errors.widen(slice(9, 12), variance[6:] * missing_s**2)
+    def _gap(self, missing_s: float, row: Floats, given: Floats | None) -> None:
+        """Go over a time without samples: a short one as if they lay on a straight line to `row`."""
+        sd = np.repeat([0.5 * missing_s**2, missing_s, MISSING_TURN * missing_s, MISSING_TURN * missing_s], 3)
+        self._errors.widen(slice(0, SIZE), sd**2)
         if missing_s > LONGEST_GAP_S:
             self._watch.stop("samples were missing for too long")
-        self._stand()
+        elif self._ahead.rows:
+            before = np.array(self._ahead.rows[-1][8:])
+            missing = round(missing_s / self._period)
+            for i in range(missing):
+                self._feed(before + (row - before) * ((i + 1) / (missing + 1)), given)
 
     def _lost(self, given: Floats | None) -> None:
         """Hold nothing of the shoulder; orientations are the orientation filter's, if it is there."""
@@ -188,13 +194,14 @@ class ShoulderFilter:
         if given is not None:
             self._world = given
 
-    def _begin_again(self, measured: Floats) -> None:
-        """Begin at a rest: level both sensors by their accelerations (12,) = gyr, acc, gyr, acc."""
+    def _settle(self, rows: Floats) -> None:
+        if not hearing.settled(self._world, self._constants, rows[:, 8:20].mean(axis=0)):
+            self._watch.stop("the accelerometers do not read gravity")
+
+    def _begin_again(self, rows: Floats) -> None:
+        """Begin at a rest; the shoulder may be anywhere, and heading is not known well."""
+        self._settle(rows)
         size = self._size
-        for i in range(2):
-            c = self._constants[12 * i : 12 * i + 12]
-            acc = measured[6 * i + 3 : 6 * i + 6] * (1.0 - c[9:12]) - c[3:6]
-            self._world[i] = levelled(self._world[i], acc)
         knot = np.repeat([size.shift, size.rest_speed], 3)
         self._errors.forget(slice(0, 12), np.concatenate([knot, [size.tilt, size.tilt, LOST_HEADING] * 2]))
 
@@ -208,9 +215,8 @@ class ShoulderFilter:
                 world, rotation.from_rotation_vector(self._constants[SITS_CONSTANTS].reshape(2, 3))
             )
         since = self._period * max(len(ahead.rows) - 1, 0)
-        covariance = self._errors.covariance
-        cross = covariance[PLACE, SPEED] * since
-        spread = covariance[PLACE, PLACE] + cross + cross.T + covariance[SPEED, SPEED] * since**2
+        go = np.concatenate([np.eye(3), since * np.eye(3)])
+        spread = go.T @ self._errors.covariance[:6, :6] @ go
         return ShoulderEstimate(
             np.zeros(3) if reason else self._place + np.array(ahead.moved[:3]),
             spread,
@@ -229,6 +235,7 @@ class ShoulderFilter:
             "place": self._place.tolist(),
             "speed": self._speed.tolist(),
             "at_rest": self._at_rest,
+            "settled": self._settled,
             "rows": [list(row) for row in self._ahead.rows],
             "moved": list(self._ahead.moved),
             "errors": self._errors.state(),
@@ -239,7 +246,7 @@ class ShoulderFilter:
         """Go on as the filter of the same arm whose state this is would have."""
         self._world, self._constants = np.array(state["world"]), np.array(state["constants"])
         self._place, self._speed = np.array(state["place"]), np.array(state["speed"])
-        self._at_rest = state["at_rest"]
+        self._at_rest, self._settled = state["at_rest"], state["settled"]
         self._errors.restore(state["errors"])
         self._watch.restore(state["watch"])
         self._ahead.rows = [list(row) for row in state["rows"]][-1:]

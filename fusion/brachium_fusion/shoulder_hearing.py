@@ -5,8 +5,9 @@ import numpy as np
 from brachium_body import rotation
 from brachium_fusion.shoulder_equations import PLACE, SPEED
 from brachium_fusion.shoulder_errors import SITS, STATE, ErrorState
-from brachium_fusion.shoulder_model import ArmModel, Floats, Sizes
+from brachium_fusion.shoulder_model import MOST_SCALE, ArmModel, Floats, Sizes, gravity_scale, levelled
 from brachium_fusion.shoulder_postures import Posture
+from brachium_fusion.shoulder_rest import SLOW_M_S
 
 STEADY = 3.0
 """A rest is steady speed if the speed 0 is so unlikely: normalised square."""
@@ -16,6 +17,22 @@ REST_RATE = 0.005
 """rad/s: of an arm that is held still, a new one each second."""
 HEADING_S = 10.0
 """The orientation filter's heading has a new error so often."""
+
+
+def settled(world_from: Floats, constants: Floats, measured: Floats) -> bool:
+    """Level both sensors (2, 4) and make their accelerations as long as gravity, in place, at a rest.
+
+    `measured` (12,) are gyr, acc, gyr, acc. Return False, and stop there, if one is far from gravity.
+    """
+    for i in range(2):
+        c = constants[12 * i : 12 * i + 12]
+        acc = measured[6 * i + 3 : 6 * i + 6]
+        scale = gravity_scale(acc * (1.0 - c[9:12]) - c[3:6])
+        if abs(scale) > MOST_SCALE:
+            return False
+        c[9:12] += scale
+        world_from[i] = levelled(world_from[i], acc * (1.0 - c[9:12]) - c[3:6])
+    return True
 
 
 def elbow_and_place(
@@ -40,6 +57,13 @@ def elbow_and_place(
     value[0], variance[0] = model.hinge - flexion @ along, size.hinge**2 / step_s
     rows[1:, PLACE], value[1:] = np.eye(3), -place
     errors.observe(rows, value, variance)
+
+
+def slow(errors: ErrorState, size: Sizes, speed: Floats, step_s: float) -> bool:
+    """Return whether the shoulder's speed (3,) m/s may well be 0, and cannot be far from it."""
+    variance = size.rest_speed**2 * 0.1 / step_s
+    small = float(np.linalg.norm(speed)) < SLOW_M_S
+    return small and errors.surprise(SPEED, -speed, variance) < STEADY
 
 
 def rest(errors: ErrorState, size: Sizes, speed: Floats, rates: Floats, rest_s: float, step_s: float) -> None:

@@ -98,79 +98,90 @@ def increments(
     `trunk_velocity` (n, 3) m/s is the part of the shoulder's velocity that the trunk makes.
     """
     k = (len(upper[1]) - 1) // every
-    step = np.full(k, every * period_s)
+    q, w, f = (np.stack(pair) for pair in zip(upper, forearm, strict=True))
+    world = rotation.to_matrix(q)
+    force = np.einsum("snij,snj->sni", world, f)
+    turns = np.concatenate(
+        [
+            force[..., None],
+            world,
+            world * f[:, :, None, :],
+            world * w[:, :, None, :],
+        ],
+        axis=3,
+    )
+    whole, early, late = _weighted(turns.transpose(1, 0, 2, 3), every, period_s)
     velocity, by_turn = np.zeros((k, 6)), np.zeros((k, 6, 12))
     by_constant, turn_by_constant = np.zeros((k, 6, CONSTANTS)), np.zeros((k, 6, CONSTANTS))
-    elbow = model.elbow_from_shoulder
-    swing = np.zeros((k, 2))
-    for i, (sensor, lever) in enumerate(((upper, model.lever_upper), (forearm, model.lever_forearm))):
-        q, w, f = sensor
-        world = rotation.to_matrix(q)
-        force = np.einsum("nij,nj->ni", world, f)
-        row, turn, first = slice(3 * i, 3 * i + 3), slice(3 * i, 3 * i + 3), 12 * i
-        whole, early, late = _weighted(force, every, period_s)
-        end_turn = slice(6 + 3 * i, 9 + 3 * i)
-        velocity[:, row] += whole - step[:, None] * np.array([0.0, 0.0, GRAVITY])
-        by_turn[:, row, turn] = -cross_matrix(early)
-        by_turn[:, row, end_turn] = -cross_matrix(late)
-        mean_world, mean_scaled, mean_rate = (
-            _weighted(m, every, period_s)[0] for m in (world, world * f[:, None, :], world * w[:, None, :])
-        )
-        by_constant[:, row, first + 3 : first + 6] = -mean_world
-        by_constant[:, row, first + 9 : first + 12] = -mean_scaled
-        turn_by_constant[:, row, first : first + 3] = -mean_world
-        turn_by_constant[:, row, first + 6 : first + 9] = -mean_rate
-        world, w = world[::every], w[::every]
-        _lever(velocity, by_turn, by_constant, world, w, lever, i, row, 1.0)
-        if i == 0:
-            _lever(velocity, by_turn, by_constant, world, w, elbow, i, slice(3, 6), -1.0)
-        swing[:, i] = np.einsum("ki,ki->k", w[1:], w[1:]) + np.linalg.norm(np.diff(w, axis=0), axis=1) / step
+    weighed = -cross_matrix(np.stack([early[..., 0], late[..., 0]]))
+    for i in range(2):
+        row, first = slice(3 * i, 3 * i + 3), 12 * i
+        velocity[:, row] = whole[:, i, :, 0]
+        by_turn[:, row, 3 * i : 3 * i + 3] = weighed[0, :, i]
+        by_turn[:, row, 6 + 3 * i : 9 + 3 * i] = weighed[1, :, i]
+        by_constant[:, row, first + 3 : first + 6] = turn_by_constant[:, row, first : first + 3] = -whole[
+            :, i, :, 1:4
+        ]
+        by_constant[:, row, first + 9 : first + 12] = -whole[:, i, :, 4:7]
+        turn_by_constant[:, row, first + 6 : first + 9] = -whole[:, i, :, 7:10]
+    velocity[:, 2::3] -= every * period_s * GRAVITY
+    rate = w[:, ::every]
+    _levers(model, world[:, ::every], rate, velocity, by_turn, by_constant)
     if trunk_velocity is not None:
         velocity -= np.tile(np.diff(trunk_velocity[::every], axis=0), 2)
+    step = np.full(k, every * period_s)
+    turning = np.sqrt(np.square(np.diff(rate, axis=1)).sum(axis=2)) / step
+    swing = (np.square(rate[:, 1:]).sum(axis=2) + turning).T
     return Increments(step, velocity, by_turn, by_constant, turn_by_constant, swing)
 
 
-def _lever(
+_SENSOR = np.array([0, 0, 1])
+_ROW = (0, 3, 3)
+_SIGN = np.array([1.0, -1.0, 1.0])
+"""Levers: upper arm's sensor to the shoulder, for its own velocity of it; shoulder to elbow, against it, and
+forearm's sensor to the elbow, for the forearm's."""
+
+
+def _levers(
+    model: ArmModel,
+    world: Floats,
+    rate: Floats,
     velocity: Floats,
     by_turn: Floats,
     by_constant: Floats,
-    world: Floats,
-    w: Floats,
-    lever: Floats,
-    sensor: int,
-    row: slice,
-    sign: float,
 ) -> None:
-    """Add the difference over each interval of the lever arm's velocity R (w x l) and its coefficients."""
-    speed = sign * np.einsum("kij,kj->ki", world, np.cross(w, lever))
-    velocity[:, row] += np.diff(speed, axis=0)
+    """Add the difference over each interval of the lever arms' velocities R (w x l) and its coefficients;
+    `world` (2, k + 1, 3, 3) and `rate` (2, k + 1, 3) are the sensors' at the knots."""
+    levers = np.stack([model.lever_upper, model.elbow_from_shoulder, model.lever_forearm])
+    levers = levers * _SIGN[:, None]
+    world, rate, arm = world[_SENSOR], rate[_SENSOR], cross_matrix(levers)[:, None]
+    across = world @ arm
+    speed = -np.einsum("lkij,lkj->lki", across, rate)
     turned = -cross_matrix(speed)
-    turn = slice(3 * sensor, 3 * sensor + 3)
-    by_turn[:, row, turn] -= turned[:-1]
-    by_turn[:, row, 6 + 3 * sensor : 9 + 3 * sensor] += turned[1:]
-    first, sits = 12 * sensor, SITS_UPPER + 3 * sensor
-    across = sign * (world @ cross_matrix(lever))
-    by_constant[:, row, first : first + 3] += np.diff(across, axis=0)
-    by_constant[:, row, first + 6 : first + 9] += np.diff(across * w[:, None, :], axis=0)
-    by_constant[:, row, sits : sits + 3] -= np.diff(
-        sign * (world @ cross_matrix(w) @ cross_matrix(lever)), axis=0
-    )
+    by_rate = np.diff(across * rate[:, :, None, :], axis=1)
+    by_sitting = np.diff(world @ cross_matrix(rate) @ arm, axis=1)
+    gained, by_bias = np.diff(speed, axis=1), np.diff(across, axis=1)
+    for lever, (sensor, at) in enumerate(zip(_SENSOR.tolist(), _ROW, strict=True)):
+        row, turn, first = slice(at, at + 3), 3 * sensor, 12 * sensor
+        velocity[:, row] += gained[lever]
+        by_turn[:, row, turn : turn + 3] -= turned[lever, :-1]
+        by_turn[:, row, 6 + turn : 9 + turn] += turned[lever, 1:]
+        by_constant[:, row, first : first + 3] += by_bias[lever]
+        by_constant[:, row, first + 6 : first + 9] += by_rate[lever]
+        by_constant[:, row, SITS_UPPER + turn : SITS_UPPER + turn + 3] -= by_sitting[lever]
 
 
 def _weighted(values: Floats, every: int, period_s: float) -> tuple[Floats, Floats, Floats]:
     """Return the integrals over each interval of values (n, ...), and of the parts that a straight line from
     1 to 0 and one from 0 to 1 weigh, by the trapezium rule."""
-    k = (len(values) - 1) // every
     shape = values.shape[1:]
+    flat = values.reshape(len(values), -1)
+    k = (len(flat) - 1) // every
     late = np.arange(1, every + 1) / every
     rule = np.ones(every)
     rule[-1] = 0.5
-    inner = values[1:].reshape(k, every, -1)
-    begin = 0.5 * values[:-1:every].reshape(k, -1)
-    whole = (begin + np.einsum("kei,e->ki", inner, rule)) * period_s
-    rising = np.einsum("kei,e->ki", inner, rule * late) * period_s
-    return (
-        whole.reshape(k, *shape),
-        (whole - rising).reshape(k, *shape),
-        rising.reshape(k, *shape),
-    )
+    weights = period_s * np.stack([rule, rule * late])
+    integral = weights @ flat[1:].reshape(k, every, -1)
+    whole = (integral[:, 0] + 0.5 * period_s * flat[:-1:every]).reshape(k, *shape)
+    rising = integral[:, 1].reshape(k, *shape)
+    return whole, whole - rising, rising

@@ -176,6 +176,18 @@ def cross_matrix(v: Floats) -> Floats:
     return m
 
 
+MOST_SCALE = 0.1
+CALIBRATED_SCALE = 0.01
+
+
+def gravity_scale(acc: Floats) -> float:
+    """Return the scale error of an accelerometer that reads `acc` (3,) m/s^2 at rest: 1 or 2 % in a chip that
+    nobody calibrated. More than MOST_SCALE is no rest, or another unit; less than CALIBRATED_SCALE may as
+    well be bias, and counts as 0."""
+    scale = 1.0 - GRAVITY / max(float(np.linalg.norm(acc)), 1e-6)
+    return scale if abs(scale) > CALIBRATED_SCALE else 0.0
+
+
 def levelled(world_from_sensor: Floats, acc: Floats) -> Floats:
     """Return the orientation (4,) turned the shortest way so that `acc` (3,), of a sensor at rest, is up."""
     up = rotation.rotate(world_from_sensor, acc)

@@ -20,7 +20,7 @@ SHORTEST_S = 0.3
 FARTHEST_M = 0.04
 """A shoulder that seems farther than this from where it was has not come back: a shrug that is held."""
 UNKNOWN_M = 0.08
-SURE_M = 0.003
+SURE_M = 0.001
 """No place is known better: people do not come back more exactly, however often."""
 MOST = 5
 START = -1

@@ -11,7 +11,17 @@ import numpy as np
 from brachium_body import rotation
 from brachium_fusion import shoulder_increments as si
 from brachium_fusion.shoulder_equations import POSTURES, SIZE
-from brachium_fusion.shoulder_model import FARTHEST_M, ArmModel, Bools, Floats, Sizes, levelled, sizes
+from brachium_fusion.shoulder_model import (
+    FARTHEST_M,
+    MOST_SCALE,
+    ArmModel,
+    Bools,
+    Floats,
+    Sizes,
+    gravity_scale,
+    levelled,
+    sizes,
+)
 from brachium_fusion.shoulder_postures import Postures
 from brachium_fusion.shoulder_window import Known, carried, samples, solve
 
@@ -57,7 +67,7 @@ def smooth_shoulder(
     with a common heading; they are needed at the `start`, a second or more in which the arm hangs still, from
     where the displacement counts. `trunk_velocity` (n, 3) m/s, world, is the trunk's part of the shoulder's
     velocity (shoulder_trunk.py): the displacement is then the girdle's alone.
-    Raises ValueError when the start is too short or has gaps.
+    Raises ValueError when the start is too short, has gaps or is no rest.
     """
     n = len(upper[0])
     first, end, _ = start.indices(n)
@@ -82,7 +92,7 @@ def smooth_shoulder(
         trunk = None if trunk_velocity is None else _padded(trunk_velocity[at:stop], every)
         one = solve(model, size, rate_hz, data, known, postures, trunk)
         rows = slice(at, stop)
-        shift[rows], sd[rows], turned[:, rows], at_rest[rows] = samples(one, every, stop - at)
+        shift[rows], sd[rows], turned[:, rows], at_rest[rows], valid[rows] = samples(one, every, stop - at)
         if stop == n:
             break
         knot = (window - overlap) // every
@@ -100,6 +110,13 @@ def _begin(size: Sizes, held: list[Floats], orientations: Pair) -> Known:
         gyr, acc = held[2 * i], held[2 * i + 1]
         world.append(levelled(rotation.mean(measured), acc.mean(axis=0)))
         constants[12 * i : 12 * i + 3] = gyr.mean(axis=0)
+        scale = gravity_scale(acc.mean(axis=0))
+        if abs(scale) > MOST_SCALE:
+            raise ValueError(
+                f"a sensor reads {np.linalg.norm(acc.mean(axis=0)):.2f} m/s^2 at the start; "
+                "give accelerations in m/s^2 and a start in which the arm rests"
+            )
+        constants[12 * i + 9 : 12 * i + 12] = scale
     knot_sd = np.array([1e-4] * 3 + [1e-3] * 3 + [size.tilt, size.tilt, size.heading] * 2)
     one = np.repeat([size.gyro_bias, size.accel_bias, size.gyro_scale, size.accel_scale], 3)
     sd = np.concatenate([one, one, np.full(6, size.mounting), np.full(POSTURES - 30, size.tissue)])

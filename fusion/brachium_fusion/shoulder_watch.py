@@ -9,18 +9,18 @@ from brachium_body import rotation
 from brachium_fusion.shoulder_model import FARTHEST_M, Floats, Sizes
 from brachium_fusion.shoulder_postures import FARTHEST_M as NOT_BACK_M
 from brachium_fusion.shoulder_postures import MOST, SAME_RAD, SURE_M, Posture
-from brachium_fusion.shoulder_rest import RATE, SPREAD, WINDOW_S
+from brachium_fusion.shoulder_rest import EARLY_M_S2, LISTEN_S, LOUDEST, RATE, SPREAD, WINDOW_S
 
 FASTEST_M_S = 1.0
-LOUDEST = 2.0
-"""m/s^2 rms over some 2 s: a shrug has 0.4, the shoulder of a person who walks 2 to 4."""
 DISAGREE = 8.0
 """Normalised square of what the two sensors say differently, over some 2 s; 1 is as expected."""
-LISTEN_S = 2.0
 RECOVER_S = 1.0
 """A rest as long as this begins anew."""
 FADE_S = 15.0
 """In this time a shoulder that moved counts as one that is held still."""
+
+EARLY_S = 0.3
+"""Enough to show the rest of a shoulder that is slow and does not accelerate."""
 
 STEP_BACK = "hold the back still and let the arm rest for a second"
 
@@ -42,13 +42,16 @@ class Watch:
         self._known = [Posture(world_from, np.zeros(3), np.zeros(3))]
         self._tied = True
 
-    def see(self, speed_gained: Floats, fastest: float, step_s: float) -> bool:
-        """Take the interval that ended: (6,) m/s, rad/s. Return whether the arm is at rest."""
+    def see(self, speed_gained: Floats, fastest: float, step_s: float, *, slow: bool) -> bool:
+        """Take the interval that ended: (6,) m/s, rad/s, and whether the shoulder was slow as it began.
+        Return whether the arm is at rest: a slow one needs less time to show it."""
         intervals = max(3, round(WINDOW_S / step_s))
         self._recent = [*self._recent, [*(speed_gained / step_s).tolist(), fastest]][-intervals:]
         seen = np.array(self._recent)
-        spread = np.sqrt(seen[:, :6].var(axis=0).reshape(2, 3).sum(axis=1).max())
-        rest = len(seen) == intervals and spread < SPREAD and seen[:, 6].max() < RATE
+        early = seen[-max(2, round(EARLY_S / step_s)) :]
+        rest = len(seen) == intervals and _quiet(seen)
+        if slow and not rest and len(seen) > len(early):
+            rest = _quiet(early) and bool(np.abs(early[:, :6].mean(axis=0)).max() < EARLY_M_S2)
         self.rest_s = self.rest_s + step_s if rest else 0.0
         self.since_rest_s = 0.0 if rest else self.since_rest_s + step_s
         if not rest:
@@ -56,7 +59,7 @@ class Watch:
         share = 1.0 - exp(-step_s / LISTEN_S)
         acceleration = 0.5 * (seen[-1, :3] + seen[-1, 3:6])
         self._loud += share * (float(acceleration @ acceleration) - self._loud)
-        return bool(rest)
+        return rest
 
     def judge(self, place: Floats, speed: Floats, sd: Floats, apart: float, step_s: float) -> None:
         """Take what was made of the interval; find the reason why it makes no sense, if so."""
@@ -126,3 +129,8 @@ class Watch:
         self._recent = [list(row) for row in state["recent"]]
         self._loud, self._apart = state["loud"], state["apart"]
         self._known = [Posture(*(np.array(part) for part in posture)) for posture in state["postures"]]
+
+
+def _quiet(seen: Floats) -> bool:
+    spread = np.sqrt(seen[:, :6].var(axis=0).reshape(2, 3).sum(axis=1).max())
+    return bool(spread < SPREAD and seen[:, 6].max() < RATE)

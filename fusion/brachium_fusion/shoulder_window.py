@@ -20,7 +20,7 @@ from brachium_fusion.shoulder_equations import (
 )
 from brachium_fusion.shoulder_model import ArmModel, Bools, Floats, Sizes
 from brachium_fusion.shoulder_postures import Posture, Postures
-from brachium_fusion.shoulder_rest import rests
+from brachium_fusion.shoulder_rest import broken, rests
 from brachium_fusion.shoulder_tissue import Tissue
 
 PASSES = 3
@@ -79,6 +79,8 @@ def solve(
     filled, missing = _filled(data, every)
     world, constants, shift = known.world_from, known.constants * LINEARISED, size.shift
     place: Floats | None = None
+    speed: Floats | None = None
+    walks = np.zeros(len(missing), dtype=bool)
     for number in range(PASSES):
         fitted = fitted_model(model, constants)
         errors = constants[: si.SITS_UPPER].reshape(2, 4, 3)
@@ -88,10 +90,14 @@ def solve(
             fitted, period, every, (sensors[0], *read[0]), (sensors[1], *read[1]), trunk_velocity
         )
         knots = sensors[:, ::every]
-        fastest = np.linalg.norm([r[0][::every] for r in read], axis=2).max(axis=0)
-        at_rest = rests(inc.velocity, step_s, fastest) & ~_beside(missing)
+        fastest = rotation.angle_between(knots[:, :-1], knots[:, 1:]).max(axis=0) / step_s
+        at_rest = rests(inc.velocity, step_s, fastest, speed) & ~_beside(missing)
+        walks = walks | broken(inc.velocity, step_s, place)
+        at_rest &= ~_beside(walks)
         tissue = Tissue.at(fitted, knots[0], knots[1], postures.start)
-        stretch = Stretch(step_s, inc, knots[0], knots[1], read[0][0][::every], at_rest, missing, tissue)
+        stretch = Stretch(
+            step_s, inc, knots[0], knots[1], read[0][0][::every], at_rest, missing, walks, tissue
+        )
         ties, used = (NO_TIES, []) if place is None else postures.ties(knots, at_rest, step_s, place, size)
         chain = equations(fitted, size, stretch, len(used), ties, shift)
         _remember(chain, known, world, constants, used)
@@ -101,8 +107,12 @@ def solve(
         constants = constants + solution.constants[:POSTURES] * LINEARISED
         turn = solution.knots[0, TURNS].reshape(2, 3)
         world = rotation.multiply(rotation.from_rotation_vector(turn), world)
-        place = solution.knots[:, PLACE]
-        shift = float(np.clip(np.sqrt(np.mean(place**2)), size.still, size.shift))
+        place, speed = solution.knots[:, PLACE], solution.knots[:, SPEED]
+        shift = (
+            float(np.clip(np.sqrt(np.mean(place[~_beside(walks)] ** 2)), size.still, size.shift))
+            if not walks.all()
+            else size.shift
+        )
     raise AssertionError("there is at least one pass")
 
 
@@ -152,9 +162,10 @@ def _remember(chain: Chain, known: Known, world: Floats, constants: Floats, used
     chain.constants[index, -1] += weight * mean
 
 
-def samples(window: Window, every: int, n: int) -> tuple[Floats, Floats, Floats, Bools]:
-    """Return displacement (n, 3), its sd (n, 3), orientations (2, n, 4) and rest (n,) at a window's samples:
-    cubic between knots for the displacement, straight for the errors of orientation."""
+def samples(window: Window, every: int, n: int) -> tuple[Floats, Floats, Floats, Bools, Bools]:
+    """Return displacement (n, 3), its sd (n, 3), orientations (2, n, 4), rest (n,) and whether no more than a
+    shoulder moves (n,), at a window's samples: cubic between knots for the displacement, straight for the errors
+    of orientation."""
     solution, stretch = window.solution, window.stretch
     t = np.arange(n) / every
     i = np.minimum(t.astype(np.int64), len(stretch.missing) - 1)
@@ -174,7 +185,7 @@ def samples(window: Window, every: int, n: int) -> tuple[Floats, Floats, Floats,
         q = rotation.multiply(q, rotation.from_rotation_vector(sits))
         sensors.append(rotation.multiply(q, rotation.from_rotation_vector(settled[j])))
     nearest = np.minimum(np.rint(t).astype(np.int64), len(sd) - 1)
-    return shift, sd[nearest], np.stack(sensors), stretch.at_rest[nearest]
+    return shift, sd[nearest], np.stack(sensors), stretch.at_rest[nearest], ~stretch.broken[i]
 
 
 def carried(window: Window, known: Known, knot: int, every: int, postures: Postures) -> Known:
