@@ -94,15 +94,13 @@ class Guess:
 class JointEquations:
     """All residuals in standard deviations: n of rates, n of angles, then the priors."""
 
-    def __init__(
-        self, motion: JointMotion, priors: AxisPriors, noise: tuple[float, float] = (1.0, 1.0)
-    ) -> None:
+    def __init__(self, motion: JointMotion, priors: AxisPriors, noise: float = 1.0) -> None:
         self.motion, self.priors, self._noise = motion, priors, noise
         self.knots_s = knots(motion.time_s)
         self._share = shares(motion.time_s, self.knots_s)
         speed = np.linalg.norm(motion.rate_a, axis=1) + np.linalg.norm(motion.rate_b, axis=1)
-        self.rate_weight = 1.0 / (noise[0] * np.hypot(RATE_SD, RATE_SHARE * speed))
-        self.angle_sd = noise[1] * ANGLE_SD
+        self.rate_weight = 1.0 / (noise * np.hypot(RATE_SD, RATE_SHARE * speed))
+        self.angle_sd = noise * ANGLE_SD
         self._together = max(1.0, len(motion.time_s) / INDEPENDENT)
 
     @staticmethod
@@ -121,11 +119,10 @@ class JointEquations:
         first, second, prior = self._residuals(guess)
         return float((self.loss(first).sum() + self.loss(second).sum()) / self._together + prior @ prior)
 
-    def noise(self, guess: Guess) -> tuple[float, float]:
-        """Return the factors by which both equations' residuals differ from RATE_SD and ANGLE_SD."""
-        first, second, _ = self._residuals(guess)
-        size = max(LEAST_NOISE, self._noise[0] * float(np.sqrt(np.mean(self.loss(first)))))
-        return size, size
+    def noise(self, guess: Guess) -> float:
+        """Return the factor by which residuals differ from RATE_SD and ANGLE_SD, by the first equation."""
+        first = self._residuals(guess)[0]
+        return max(LEAST_NOISE, self._noise * float(np.sqrt(np.mean(self.loss(first)))))
 
     def unexplained(self, guess: Guess) -> float:
         """Return the rms of the rate across both axes over the rms of the joint's rate."""

@@ -17,7 +17,8 @@ import numpy.typing as npt
 
 from brachium_body import rotation
 from brachium_body.segments import SIDES, Side, arm_segments
-from brachium_fusion.elbow_alignment import ElbowFound, Refused, find_elbow
+from brachium_fusion.elbow_alignment import ElbowFound, ElbowSensors, Refused, find_elbow
+from brachium_fusion.hand_alignment import hand_mounting, wrist_heading
 from brachium_fusion.joint_motion import SensorMotion
 from brachium_fusion.pose import POSES, Alignment, PoseName, PoseSensor, align, pose_orientations
 from brachium_fusion.segment_frames import ElbowPose
@@ -87,7 +88,7 @@ def align_segments(
         elif found is not None:
             elbows[side] = found
             refused |= found.refused
-    return _joined(records, still, pose, elbows, refused, facing_deg)
+    return _joined(records, still, pose, spans, rate_hz, elbows, refused, facing_deg)
 
 
 def _check(records: Mapping[str, SensorRecord], spans: Sequence[Span], rate_hz: float) -> None:
@@ -148,8 +149,14 @@ def _elbow(
     stated = _stated(pose)
     hanging = pose.kind == "n-pose"
     return find_elbow(
-        SensorMotion(world_from_sensor=records[upper].world_from_sensor, acc=records[upper].acc),
-        SensorMotion(world_from_sensor=records[forearm].world_from_sensor, acc=records[forearm].acc),
+        ElbowSensors(
+            side=side,
+            upper=_motion(records[upper]),
+            forearm=_motion(records[forearm]),
+            shared_heading=records[upper].magnetometer and records[forearm].magnetometer,
+            nominal_upper=records[upper].nominal_mounting,
+            nominal_forearm=records[forearm].nominal_mounting,
+        ),
         ElbowPose(
             upper_sensor=rotation.mean(still[upper]),
             forearm_sensor=rotation.mean(still[forearm]),
@@ -162,11 +169,11 @@ def _elbow(
         ),
         [(pose.kind, pose.first, pose.end), *moving],
         rate_hz,
-        side,
-        shared_heading=records[upper].magnetometer and records[forearm].magnetometer,
-        nominal_upper=records[upper].nominal_mounting,
-        nominal_forearm=records[forearm].nominal_mounting,
     )
+
+
+def _motion(record: SensorRecord) -> SensorMotion:
+    return SensorMotion(world_from_sensor=record.world_from_sensor, acc=record.acc)
 
 
 def _stated(pose: Span) -> dict[str, float]:
@@ -179,6 +186,8 @@ def _joined(
     records: Mapping[str, SensorRecord],
     still: Mapping[str, Floats],
     pose: Span,
+    spans: Sequence[Span],
+    rate_hz: float,
     elbows: Mapping[Side, ElbowFound],
     refused: dict[str, str],
     facing_deg: float | None,
@@ -198,7 +207,7 @@ def _joined(
     base = align(sensors, targets, facing_deg=facing_deg, elbow_axis=axes)
     heading, mounting = dict(base.heading), dict(base.mounting)
     scores, assumed = dict(base.scores), set(base.assumed)
-    trunk_from_world = rotation.inverse(base.world_from_trunk)
+    time_s = 0.5 * (pose.first + pose.end) / rate_hz
     for side, found in elbows.items():
         upper, forearm, hand = arm_segments(side)
         heading[forearm] = float(rotation.wrap(heading[upper] + found.joint.heading_rad))
@@ -207,17 +216,21 @@ def _joined(
         assumed.discard(forearm)
         if upper in assumed:
             assumed.add(forearm)
+        if hand not in still:
+            continue
+        if not records[hand].magnetometer:
+            rows = [(span.first, span.end) for span in spans]
+            turn = wrist_heading(_motion(records[forearm]), _motion(records[hand]), rows, time_s, rate_hz)
+            if turn is not None:
+                heading[hand] = float(rotation.wrap(heading[forearm] + turn))
+                assumed.discard(hand)
         stands = rotation.multiply(rotation.about(2, heading[forearm]), rotation.mean(still[forearm]))
-        stands = rotation.multiply(trunk_from_world, stands)
-        forearm_in_pose = rotation.multiply(stands, rotation.inverse(mounting[forearm]))
-        # the hand keeps the wrist's stated angles against the forearm as it really is
-        wrist = rotation.multiply(rotation.inverse(targets[forearm]), targets[hand])
-        targets[hand] = rotation.multiply(forearm_in_pose, wrist)
-    again = align(sensors, targets, facing_deg=facing_deg, elbow_axis=axes)
-    for side in elbows:
-        hand = arm_segments(side)[2]
-        if hand in again.mounting:
-            heading[hand], mounting[hand] = again.heading[hand], again.mounting[hand]
+        mounting[hand] = hand_mounting(
+            rotation.multiply(stands, rotation.inverse(mounting[forearm])),
+            rotation.multiply(rotation.inverse(targets[forearm]), targets[hand]),
+            rotation.mean(still[hand]),
+            heading[hand],
+        )
     return replace(
         base,
         heading=heading,
