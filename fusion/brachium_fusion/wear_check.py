@@ -1,15 +1,17 @@
 """The wear check: which node sits on which segment and side, and whether it is turned. Pure.
 
 One arm at a time, 10 s: it hangs, is raised sideways and let down, the elbow is bent and straightened. In
-segment axes (X forward, Y proximal, Z right) every segment feels up along Y; raising turns the whole arm about
--X (right) or +X (left); bending turns forearm and hand about +Z. Half turns of a sensor change two of the
-three signs, the other arm one: so all can be told apart where a segment does both. Forearm and hand do the same
-and differ by their distance from the elbow. What cannot be told: the segments of an arm that hangs still from
-one another and from the sternum, and which side an upper arm is on when no other node moves with it.
+segment axes (X forward, Y proximal, Z right) every segment feels up along Y; raising turns the whole arm
+about -X (right) or +X (left); bending turns forearm and hand about +Z. Half turns of a sensor change two of
+the three signs, the other arm one: so all can be told apart where a segment does both. Forearm and hand do
+the same and differ by their distance from the elbow. What cannot be told: the segments of an arm that hangs
+still from one another and from the sternum, and which side an upper arm is on when no other node moves with
+it.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from math import radians
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -17,7 +19,7 @@ import numpy.typing as npt
 from scipy.optimize import linear_sum_assignment
 
 from brachium_body import rotation
-from brachium_body.segments import Segment, Side, part_of, side_of
+from brachium_body.segments import SIDES, Segment, Side, arm_segments, part_of, side_of
 from brachium_fusion.wear_features import Felt, Motion, Rows, WearRecord, felt
 
 Floats = npt.NDArray[np.float64]
@@ -31,17 +33,17 @@ TURNS: dict[Turn, Floats] = {
 }
 """as_it_should_sit_from_as_it_sits, in sensor axes: z off the skin, y along the segment."""
 
-DIRECTION_RAD = np.radians(25.0)
+DIRECTION_RAD = radians(25.0)
 """SD of a direction: sensors sit up to 15 deg off, people raise an arm somewhat in front of the body."""
-STILL_RAD = np.radians(15.0)
+STILL_RAD = radians(15.0)
 """SD of what a segment turns that should be still."""
-TOO_LITTLE_RAD = np.radians(30.0)
+TOO_LITTLE_RAD = radians(30.0)
 """An arm that was raised or bent turned at least this far."""
 DISTANCE_M = 0.035
 """SD of the distance from the elbow: 5 % of length from height, and where on the segment the strap is."""
 UNCLEAR = 14.0
 """Sum of squares above which a node fits nowhere: of some six normal terms one in fifty exceeds it."""
-RESTLESS_RAD = np.radians(6.0)
+RESTLESS_RAD = radians(6.0)
 """An arm sways by a degree or two while it hangs."""
 MARGIN = 4.0
 """Being as it should be is preferred by this much: one clear contradiction weighs more."""
@@ -95,8 +97,8 @@ def check_wear(
 ) -> WearCheck:
     """Return where each node sits, from one pass an arm, all with the same nodes.
 
-    With nodes on both arms give both passes. With one arm's, the nodes may all be on the other arm, which then
-    moved instead of the one that was asked for.
+    With nodes on both arms give both passes. With one arm's, the nodes may all be on the other arm, which
+    then moved instead of the one that was asked for.
     """
     feelings = [(p.moved, {s: felt(r, p.spans, rate_hz) for s, r in p.records.items()}) for p in passes]
     for _, felt_now in feelings:
@@ -113,6 +115,11 @@ def check_wear(
 
 
 _OTHER: dict[Side, Side] = {"right": "left", "left": "right"}
+_OTHER_ARM: dict[Segment, Segment] = {
+    segment: there
+    for side in SIDES
+    for segment, there in zip(arm_segments(side), arm_segments(_OTHER[side]), strict=True)
+}
 Feelings = list[tuple[Side, dict[Segment, Felt]]]
 
 
@@ -138,7 +145,7 @@ def _assign(
 ) -> dict[Segment, _Seat]:
     """Return the cheapest way to seat all nodes, each seat taken once."""
     names = list(nominal)
-    seats: list[Segment] = list(dict.fromkeys([*names, *(_other_side(s) for s in names)]))
+    seats: list[Segment] = list(dict.fromkeys([*names, *(_OTHER_ARM.get(s, s) for s in names)]))
     best = [
         [
             min(
@@ -154,12 +161,6 @@ def _assign(
     ]
     rows, columns = linear_sum_assignment([[option.cost for option in row] for row in best])
     return {names[i]: best[i][j] for i, j in zip(rows.tolist(), columns.tolist(), strict=True)}
-
-
-def _other_side(segment: Segment) -> Segment:
-    if segment.endswith("_r"):
-        return segment[:-1] + "l"  # type: ignore[return-value]
-    return segment[:-1] + "r" if segment.endswith("_l") else segment  # type: ignore[return-value]
 
 
 def _cost(

@@ -5,7 +5,6 @@ from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
-
 from scipy.signal import butter, sosfiltfilt
 
 from brachium_body import rotation
