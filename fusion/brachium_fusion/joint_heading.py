@@ -5,7 +5,7 @@ it brings the two to cover each other. Where the joint's axes are known, so is t
 that the joint has not (reference mathematics 7) and the angle between its axes.
 """
 
-from math import pi, sin
+from math import hypot, pi, sin
 from typing import Any
 
 import numpy as np
@@ -23,6 +23,8 @@ RATE_SD = 0.3
 """rad/s about the direction that the joint has not: tissue and wrong axes."""
 ANGLE_SD = 0.15
 """rad, of the angle between the axes."""
+MOST_EVIDENCE = 20.0
+"""No single instant counts for more (natural logarithm), however hard the blow."""
 ALIKE_S = 0.25
 """Errors stay alike for this long; evidence counts once in it."""
 FORGET_S = 20.0
@@ -50,7 +52,7 @@ class HeadingSearch:
             (ax, ay, _), (bx, by, _) = acceleration.tolist()
             if min(ax * ax + ay * ay, bx * bx + by * by) > LEAST_ACCELERATION**2:
                 along, across = ax * bx + ay * by, ay * bx - ax * by
-                gain = weight / ACCELERATION_SD**2
+                gain = weight / max(ACCELERATION_SD**2, hypot(along, across) / MOST_EVIDENCE)
                 self.likelihood += gain * (along * self._cosines + across * self._sines)
         if self._joint.has_axes:
             self.likelihood += weight * self._axes(attitude, rotation.rotate(attitude, rate))
@@ -88,8 +90,10 @@ class HeadingSearch:
         odds /= odds.sum()
         x, y = float(odds @ self._cosines), float(odds @ self._sines)
         length = min(1.0, np.hypot(x, y))
-        spread = pi if length < 1e-3 else min(pi, float(np.sqrt(-2.0 * np.log(length))))
-        return float(np.arctan2(y, x)), max(spread, pi / HEADINGS)
+        if length < 1e-3:
+            return 0.0, pi
+        spread = float(np.sqrt(-2.0 * np.log(length)))
+        return float(np.arctan2(y, x)), min(pi, max(spread, pi / HEADINGS))
 
     def is_found(self) -> bool:
         """One heading stands out."""

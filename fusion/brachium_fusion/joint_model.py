@@ -26,7 +26,8 @@ Floats = npt.NDArray[np.float64]
 
 NODE_S = 0.08
 """Constraints are applied this often: twice as often as the arm's fastest movements need."""
-TILT_SD = radians(3.0)
+TILT_SD = radians(10.0)
+"""At the beginning, maybe in full movement: 1 m/s^2 sideways is 6 deg."""
 GYRO_BIAS_SD = radians(0.5)
 """Left after calibration, or after switching on in another temperature."""
 ACC_BIAS_SD = 0.15
@@ -91,38 +92,22 @@ class Interval:
     span_s: float
 
     @staticmethod
-    def empty(*shape: int) -> "Interval":
-        """Return intervals without samples."""
-        turn = np.zeros((*shape, 2, 4))
-        turn[..., 0] = 1.0
-        return Interval(turn, np.zeros((*shape, 2, 3, 3)), np.zeros((*shape, 2, 3)), np.zeros(shape), 0.0)
-
-    def extend(self, gyr: Floats, acc: Floats, period_s: float) -> None:
-        """Take the mean rates and specific forces (..., 2, 3) over the next period."""
-        half = rotation.from_rotation_vector(0.5 * period_s * gyr)
-        middle = rotation.multiply(self.turn, half)
-        matrix = rotation.to_matrix(middle)
-        self.spread = self.spread + matrix * period_s
-        self.push = self.push + (matrix @ acc[..., None])[..., 0] * period_s
-        self.turn = rotation.multiply(middle, half)
-        self.squared = self.squared + np.einsum("...i,...i->...", gyr, gyr).max(axis=-1) * period_s
-        self.span_s += period_s
+    def gather(turns: Floats, gyr: Floats, acc: Floats, period_s: float) -> "Interval":
+        """Return what samples (..., k + 1, 2, 3), rad/s and m/s^2, from one node to the next add up to;
+        `turns` (..., k + 1, 2, 4) are the rotations start_from_sample."""
+        matrix = rotation.to_matrix(turns)
+        weight = np.full(gyr.shape[-3], period_s)
+        weight[[0, -1]] = 0.5 * period_s
+        push = np.einsum("k,...ksij,...ksj->...si", weight, matrix, acc)
+        squared = np.einsum("...i,...i->...", gyr, gyr).max(axis=-1) @ weight
+        spread = np.einsum("k,...ksij->...sij", weight, matrix)
+        return Interval(turns[..., -1, :, :], spread, push, squared, period_s * (len(weight) - 1))
 
     def at(self, index: int | slice) -> "Interval":
         """Return one of many intervals, or some."""
         return Interval(
             self.turn[index], self.spread[index], self.push[index], self.squared[index], self.span_s
         )
-
-    def state(self) -> list[Any]:
-        """Return all as plain values."""
-        return [*(array.tolist() for array in (self.turn, self.spread, self.push, self.squared)), self.span_s]
-
-    @staticmethod
-    def of(state: list[Any]) -> "Interval":
-        """Return the interval whose state this is."""
-        turn, spread, push, squared = (np.array(values) for values in state[:4])
-        return Interval(turn, spread, push, squared, state[4])
 
 
 @dataclass(slots=True, eq=False)
@@ -138,6 +123,10 @@ class JointState:
     lever: Floats
     covariance: Floats
     """(30, 30)."""
+    noise: Floats
+    """(1,) learnt factor of the variances of noise."""
+    still_s: Floats
+    """(2,) s for how long each sensor has been at rest."""
 
     def copy(self) -> "JointState":
         """Return another with the same values."""
@@ -153,7 +142,8 @@ class JointState:
         return JointState(*(np.array(values) for values in state))
 
     def _arrays(self) -> tuple[Floats, ...]:
-        return self.attitude, self.velocity, self.gyro_bias, self.acc_bias, self.lever, self.covariance
+        known = self.attitude, self.velocity, self.gyro_bias, self.acc_bias, self.lever
+        return *known, self.covariance, self.noise, self.still_s
 
 
 BLOCK = 15
@@ -174,7 +164,10 @@ def begin(joint: Joint, attitude: Floats, gyr: Floats, heading_sd: float) -> Joi
     matrix = rotation.to_matrix(attitude)
     velocity = -np.einsum("sij,sj->si", matrix, np.cross(gyr, lever))  # the joint centre rests
     covariance = np.diag(deviation.ravel() ** 2)
-    return JointState(attitude.copy(), velocity, np.zeros((2, 3)), np.zeros((2, 3)), lever, covariance)
+    no_bias = np.zeros((2, 3))
+    return JointState(
+        attitude.copy(), velocity, no_bias, no_bias.copy(), lever, covariance, np.ones(1), np.zeros(2)
+    )
 
 
 def resume(joint: Joint, state: JointState, attitude: Floats, gyr: Floats, heading_sd: float) -> JointState:
@@ -183,7 +176,7 @@ def resume(joint: Joint, state: JointState, attitude: Floats, gyr: Floats, headi
     kept = _LEARNT[:, None], _LEARNT[None, :]
     new.covariance[kept] = state.covariance[kept]
     new.gyro_bias, new.acc_bias = state.gyro_bias.copy(), state.acc_bias.copy()
-    new.lever = state.lever.copy()
+    new.lever, new.noise = state.lever.copy(), state.noise.copy()
     return new
 
 
@@ -216,9 +209,14 @@ def attitude_after(attitude: Floats, gyro_bias: Floats, turn: Floats, spread: Fl
     return rotation.normalize(rotation.multiply(attitude, turned))
 
 
+def step_of(gyr_before: Floats, gyr: Floats, period_s: float) -> Floats:
+    """Return the turn (..., 4) from one sample to the next, of the rates (..., 3) at both."""
+    return rotation.from_rotation_vector((0.5 * period_s) * (gyr_before + gyr))
+
+
 def in_given_world(attitude: Floats, given: Floats, shared: bool) -> tuple[Floats, Floats]:
-    """Return attitudes (..., 2, 4) with the common heading of the given ones (..., 2, 4), and by how much b's
-    given heading differs (...): the common heading is a's, or the mean of both where they share one."""
+    """Return attitudes (..., 2, 4) with the heading of the world of the given ones (..., 2, 4), and b's turn
+    about the vertical to a (...). That world's heading is a's, or the mean of both where they share one."""
     to_given = rotation.heading(rotation.multiply(given, rotation.inverse(attitude)))
     heading = rotation.wrap(to_given[..., 0] - to_given[..., 1])
     common = to_given[..., 0] - (0.5 * heading if shared else 0.0)

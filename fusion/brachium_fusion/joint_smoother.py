@@ -19,12 +19,12 @@ from brachium_fusion.joint_model import (
     Joint,
     JointState,
     add,
-    attitude_after,
     begin,
     difference,
     heading_sd,
     in_given_world,
     resume,
+    step_of,
 )
 from brachium_fusion.joint_update import SHARED_HEADING_SD, advance, constrain
 
@@ -81,6 +81,18 @@ def smooth_joint(
     return JointTrajectory(attitude[:, 0], attitude[:, 1], heading, sd, residual)
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class _Nodes:
+    """What was found at the nodes of a part."""
+
+    attitude: Floats
+    """(nodes + 1, 2, 4)."""
+    heading_sd: Floats
+    residual: Floats
+    first: JointState
+    """Smoothed, at the first node."""
+
+
 class _Part:
     """A stretch without gaps."""
 
@@ -88,25 +100,20 @@ class _Part:
         self, joint: Joint, rate_hz: float, gyr: Floats, acc: Floats, given: Floats, shared: bool
     ) -> None:
         self.joint, self.gyr, self.given, self.shared = joint, gyr, given, shared
-        self.period = 1.0 / rate_hz
         self.last: JointState | None = None
         """The state at the end, once solved."""
         self.every = max(1, round(NODE_S * rate_hz))
         self.nodes = (len(gyr) - 1) // self.every
         self.at = np.arange(self.nodes + 1) * self.every
-        self.partial: list[tuple[Floats, Floats]] = []
-        """After each sample of an interval, of all intervals: turn (nodes, 2, 4), spread (nodes, 2, 3, 3)."""
-        self.intervals = self._gather(acc)
-
-    def _gather(self, acc: Floats) -> Interval:
-        intervals = Interval.empty(self.nodes)
-        span = (self.nodes, self.every, 2, 3)
-        gyr = (0.5 * (self.gyr[1:] + self.gyr[:-1]))[: self.nodes * self.every].reshape(span)
-        acc = (0.5 * (acc[1:] + acc[:-1]))[: self.nodes * self.every].reshape(span)
+        self.steps = step_of(gyr[:-1], gyr[1:], 1.0 / rate_hz)
+        """(n - 1, 2, 4) from each sample to the next."""
+        self.turns = np.empty((self.nodes, self.every + 1, 2, 4))
+        """start_from_sample of every interval."""
+        self.turns[:, 0] = rotation.IDENTITY
         for i in range(self.every):
-            intervals.extend(gyr[:, i], acc[:, i], self.period)
-            self.partial.append((intervals.turn, intervals.spread))
-        return intervals
+            self.turns[:, i + 1] = rotation.multiply(self.turns[:, i], self.steps[self.at[:-1] + i])
+        pieces = self.at[:-1, None] + np.arange(self.every + 1)
+        self.intervals = Interval.gather(self.turns, gyr[pieces], acc[pieces], 1.0 / rate_hz)
 
     def solve(self, learnt: JointState | None) -> tuple[Floats, Floats, Floats, Floats]:
         """Return attitudes (n, 2, 4), heading (n,), its standard deviation and residual (n,); `learnt` gives
@@ -121,11 +128,28 @@ class _Part:
             state = begin(self.joint, first, self.gyr[0], sd)
         else:
             state = resume(self.joint, learnt, first, self.gyr[0], sd)
-        attitude, bias, deviation, residual = self._smooth(state)
-        every_sample = self._all_samples(attitude, bias)
-        rows, heading = in_given_world(every_sample, self.given, self.shared)
+        # The tilt given at the beginning may be far off, which one linear step back does not mend.
+        again = self._smooth(state.copy(), min(BLOCK_NODES, self.nodes)).first
+        state.attitude, state.velocity = again.attitude, again.velocity
+        found = self._smooth(state, self.nodes)
+        self.last = state
+        rows, heading = in_given_world(self._all_samples(found.attitude), self.given, self.shared)
         node = np.minimum(np.arange(len(self.gyr)) // self.every, self.nodes)
-        return rows, heading, deviation[node], residual[node]
+        return rows, heading, found.heading_sd[node], found.residual[node]
+
+    def _all_samples(self, attitude: Floats) -> Floats:
+        """Fill the samples between nodes by the gyroscopes; what lacks at the next node is spread evenly."""
+        whole = rotation.multiply(attitude[:-1], self.turns[:, -1])
+        lacking = rotation.to_rotation_vector(rotation.multiply(attitude[1:], rotation.inverse(whole)))
+        rows = np.empty((len(self.gyr), 2, 4))
+        rows[self.at] = attitude
+        for i in range(1, self.every):
+            part = rotation.from_rotation_vector(lacking * (i / self.every))
+            turned = rotation.multiply(attitude[:-1], self.turns[:, i])
+            rows[self.at[:-1] + i] = rotation.multiply(part, turned)
+        for i in range(int(self.at[-1]) + 1, len(rows)):
+            rows[i] = rotation.multiply(rows[i - 1], self.steps[i - 1])
+        return rows
 
     def _search(self) -> tuple[float, float]:
         """Return b's heading at the beginning and its standard deviation."""
@@ -137,10 +161,9 @@ class _Part:
         acceleration = centre_acceleration(self.joint, gathered, given[:-1], given[1:], rate[:-1], rate[1:])
         for node in range(count):
             search.take(given[node + 1], rate[node + 1], acceleration[node], self.intervals.span_s)
-        best, sd = search.best()
         if search.is_found():
-            return best, CERTAIN_SD
-        return (0.0, SHARED_HEADING_SD) if self.shared else (best, sd)
+            return search.best()[0], CERTAIN_SD
+        return 0.0, SHARED_HEADING_SD if self.shared else pi
 
     def _forward(
         self, state: JointState, first: int, end: int
@@ -156,45 +179,29 @@ class _Part:
             residual = constrain(state, self.joint, self.gyr[self.at[node + 1]], shared)
             yield transition, predicted, state.copy(), residual
 
-    def _smooth(self, state: JointState) -> tuple[Floats, Floats, Floats, Floats]:
-        """Return attitude (nodes + 1, 2, 4), gyroscope bias, heading's standard deviation and residual."""
-        begins = list(range(0, self.nodes, BLOCK_NODES))
+    def _smooth(self, state: JointState, nodes: int) -> "_Nodes":
+        """Return what holds at nodes 0 to `nodes`, of the state at node 0, which becomes the last."""
+        begins = list(range(0, nodes, BLOCK_NODES))
         starts = []
         for first in begins:
             starts.append(state.copy())
-            for _ in self._forward(state, first, min(first + BLOCK_NODES, self.nodes)):
+            for _ in self._forward(state, first, min(first + BLOCK_NODES, nodes)):
                 pass
-        self.last = smoothed = state.copy()
-        attitude, bias = np.empty((self.nodes + 1, 2, 4)), np.empty((self.nodes + 1, 2, 3))
-        deviation, residual = np.empty(self.nodes + 1), np.zeros(self.nodes + 1)
+        smoothed = state
+        attitude, deviation, residual = np.empty((nodes + 1, 2, 4)), np.empty(nodes + 1), np.zeros(nodes + 1)
+        attitude[-1], deviation[-1] = state.attitude, heading_sd(state.covariance)
         for first, start in zip(reversed(begins), reversed(starts), strict=True):
-            end = min(first + BLOCK_NODES, self.nodes)
+            end = min(first + BLOCK_NODES, nodes)
             block = [(np.eye(1), start, start.copy(), 0.0), *self._forward(start.copy(), first, end)]
             for node in range(end, first - 1, -1):
                 if node < end:
                     transition, predicted, _, _ = block[node + 1 - first]
                     _, _, filtered, _ = block[node - first]
                     smoothed = _back(filtered, transition, predicted, smoothed)
-                attitude[node], bias[node] = smoothed.attitude, smoothed.gyro_bias
-                deviation[node] = heading_sd(smoothed.covariance)
+                attitude[node], deviation[node] = smoothed.attitude, heading_sd(smoothed.covariance)
                 if node > first:
                     residual[node] = block[node - first][3]
-        return attitude, bias, deviation, residual
-
-    def _all_samples(self, attitude: Floats, bias: Floats) -> Floats:
-        """Fill the samples between nodes by the gyroscopes, what lacks at the next node spread evenly."""
-        whole = attitude_after(attitude[:-1], bias[:-1], self.intervals.turn, self.intervals.spread)
-        missing = rotation.to_rotation_vector(rotation.multiply(attitude[1:], rotation.inverse(whole)))
-        rows = np.empty((len(self.gyr), 2, 4))
-        rows[self.at] = attitude
-        for i, (turn, spread) in enumerate(self.partial[:-1], start=1):
-            part = rotation.from_rotation_vector(missing * (i / self.every))
-            moved = attitude_after(attitude[:-1], bias[:-1], turn, spread)
-            rows[self.at[:-1] + i] = rotation.multiply(part, moved)
-        for i in range(int(self.at[-1]) + 1, len(rows)):
-            rate = 0.5 * (self.gyr[i] + self.gyr[i - 1]) - bias[-1]
-            rows[i] = rotation.multiply(rows[i - 1], rotation.from_rotation_vector(rate * self.period))
-        return rows
+        return _Nodes(attitude, deviation, residual, smoothed)
 
 
 def _back(

@@ -34,11 +34,21 @@ CENTRE_SD_PER_RATE = 0.004
 SPEED_TIME_S = 1.0
 """For how long its velocity stays alike."""
 AXIS_SD = radians(3.0)
-AXIS_TIME_S = 1.0
+AXIS_TIME_S = 5.0
 SHARED_HEADING_SD = radians(20.0)
 """Of the heading between two magnetometers indoors, where iron turns the field along the arm."""
 SHARED_HEADING_TIME_S = 60.0
 """It stays as wrong as it is while the arm stays where it is."""
+STILL_RATE = radians(2.0)
+"""rad/s, mean over an interval: slower is rest, once it lasted."""
+STILL_S = 1.5
+STILL_SD = radians(0.3)
+"""rad/s: an arm at rest sways."""
+STILL_TIME_S = 1.0
+NOISE_TIME_S = 20.0
+"""Over this the noise of walks and agreement is learnt from the joint's residuals."""
+LEAST_NOISE, MOST_NOISE = 0.1, 10.0
+"""Within which the learnt noise stays, of the variances above."""
 OUTLIER = 3.0
 """An innovation of more than this many standard deviations is given less weight."""
 
@@ -65,6 +75,8 @@ def advance(state: JointState, interval: Interval) -> Floats:
     state.attitude = attitude_after(state.attitude, state.gyro_bias, interval.turn, interval.spread)
     state.velocity = state.velocity + push
     state.velocity[:, 2] -= GRAVITY * span
+    moves = np.linalg.norm(rotation.to_rotation_vector(interval.turn), axis=1) > STILL_RATE * span
+    state.still_s = np.where(moves, 0.0, state.still_s + span)
     spread = matrix @ interval.spread
     lean = skew(push)
     transition = np.eye(2 * BLOCK)
@@ -74,9 +86,10 @@ def advance(state: JointState, interval: Interval) -> Floats:
         transition[at + 3 : at + 6, at + 6 : at + 9] = 0.5 * lean[i] @ spread[i]
         transition[at + 3 : at + 6, at + 9 : at + 12] = -spread[i]
     covariance = transition @ state.covariance @ transition.T
-    walk = ATTITUDE_WALK**2 * span + ATTITUDE_WALK_PER_RATE**2 * float(interval.squared)
-    walks = np.array([VELOCITY_WALK, GYRO_BIAS_WALK, ACC_BIAS_WALK, 0.0])
-    noise = np.repeat(np.concatenate([[walk], walks**2 * span]), 3)
+    turning = ATTITUDE_WALK**2 * span + ATTITUDE_WALK_PER_RATE**2 * float(interval.squared)
+    wobble = float(state.noise[0])
+    walks = [wobble * turning, wobble * VELOCITY_WALK**2 * span]
+    noise = np.repeat([*walks, GYRO_BIAS_WALK**2 * span, ACC_BIAS_WALK**2 * span, 0.0], 3)
     covariance[_DIAGONAL, _DIAGONAL] += np.concatenate([noise, noise])
     state.covariance = covariance
     return transition
@@ -100,17 +113,30 @@ def constrain(state: JointState, joint: Joint, gyr: Floats, shared: float | None
     rows[3:6, :BLOCK], rows[3:6, BLOCK:] = 0.5 * per_sensor[0], 0.5 * per_sensor[1]
     apart = centre[0] - centre[1]
     squared = float(np.einsum("si,si->s", rate, rate).max())
-    agree = CENTRE_SD**2 + CENTRE_SD_PER_RATE**2 * squared
+    agree = float(state.noise[0]) * (CENTRE_SD**2 + CENTRE_SD_PER_RATE**2 * squared)
     noise = np.repeat([agree, SPEED_SD**2 * SPEED_TIME_S / NODE_S], 3)
     residual = _correct(state, rows, np.concatenate([-apart, -centre.mean(axis=0)]), noise)
+    surprise = min(residual * residual, OUTLIER**2) - 1.0
+    state.noise = np.clip(state.noise * np.exp(surprise * NODE_S / NOISE_TIME_S), LEAST_NOISE, MOST_NOISE)
+    for i in np.flatnonzero(state.still_s > STILL_S).tolist():
+        _hold_still(state, gyr, i)
     if joint.has_axes:
         _hold_axes(state, joint)
     if shared is not None:
         row = np.zeros((1, 2 * BLOCK))
         row[0, 2], row[0, BLOCK + 2] = -1.0, 1.0
         variance = SHARED_HEADING_SD**2 * SHARED_HEADING_TIME_S / NODE_S
-        _correct(state, row, np.array([shared]), np.array([variance]))
+        _correct(state, row, np.array([-shared]), np.array([variance]))
     return residual
+
+
+def _hold_still(state: JointState, gyr: Floats, sensor: int) -> None:
+    """What the gyroscope of a sensor at rest reads is its bias."""
+    rows = np.zeros((3, 2 * BLOCK))
+    rows[:, sensor * BLOCK + 6 : sensor * BLOCK + 9] = np.eye(3)
+    _correct(
+        state, rows, gyr[sensor] - state.gyro_bias[sensor], np.full(3, STILL_SD**2 * STILL_TIME_S / NODE_S)
+    )
 
 
 def _hold_axes(state: JointState, joint: Joint) -> None:

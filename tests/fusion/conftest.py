@@ -125,3 +125,64 @@ def made() -> SimpleNamespace:
         orientation_messages=orientation_messages,
         info_messages=info_messages,
     )
+
+
+def _wave(random, rms, slowest_hz, fastest_hz):
+    """Return a smooth random function of time with this RMS."""
+    hz, phase = random.uniform(slowest_hz, fastest_hz, 6), random.uniform(0.0, 2.0 * np.pi, 6)
+    size = random.uniform(0.5, 1.0, 6)
+    size *= rms * np.sqrt(2.0 / (size @ size))
+    return lambda t: np.sin(2.0 * np.pi * np.multiply.outer(t, hz) + phase) @ size
+
+
+class Pendulum:
+    """Two sensors beside a joint of 1, 2 or 3 axes, swung at random: exact orientations, rates and forces."""
+
+    lever_a, lever_b = np.array([0.12, 0.01, -0.015]), np.array([-0.15, 0.0, 0.02])
+    axis_a = np.array([0.0, 0.0, 1.0])
+
+    def __init__(self, axes, seconds, rate, seed, still_from_s=np.inf) -> None:
+        random = np.random.default_rng(seed)
+        self.axes, self.still_from_s = axes, still_from_s
+        self.axis_b = np.array([0.0, 0.0, 1.0]) if axes == 1 else np.array([0.0, 1.0, 0.0])
+        self._swing = [_wave(random, rms, 0.1, 1.1) for rms in (0.7, 0.6, 0.6, 0.7, 0.7, 0.6)]
+        self._path = [_wave(random, 0.07, 0.3, 0.9) for _ in range(3)]
+        t = np.arange(round(seconds * rate)) / rate
+        self.world_from_a, self.world_from_b = self._orientations(t)
+        self.gyr_a, self.acc_a = self._seen(t, 0, self.lever_a)
+        self.gyr_b, self.acc_b = self._seen(t, 1, self.lever_b)
+
+    def _own_time(self, t):
+        """It comes to rest within two seconds."""
+        u = np.clip(t - self.still_from_s, 0.0, 2.0) / 2.0
+        return np.minimum(t, self.still_from_s) + 2.0 * (u - u**3 + u**4 / 2.0)
+
+    def _orientations(self, t):
+        s = [swing(self._own_time(t)) for swing in self._swing]
+        a = rotation.multiply(rotation.about(2, s[0]), rotation.about(0, s[1]))
+        a = rotation.multiply(a, rotation.about(1, s[2]))
+        bend = rotation.about(2, s[3] + 0.8)
+        if self.axes == 3:
+            bend = rotation.multiply(bend, rotation.about(0, s[5]))
+        if self.axes >= 2:
+            bend = rotation.multiply(bend, rotation.about(1, s[4]))
+        return a, rotation.multiply(a, bend)
+
+    def _seen(self, t, sensor, lever, h=1e-3):
+        def rate(t):
+            before, after = self._orientations(t - h)[sensor], self._orientations(t + h)[sensor]
+            return rotation.to_rotation_vector(rotation.multiply(rotation.inverse(before), after)) / (2.0 * h)
+
+        def centre(t):
+            return np.stack([path(self._own_time(t)) for path in self._path], axis=-1)
+
+        force = (centre(t + h) - 2.0 * centre(t) + centre(t - h)) / h**2 + [0.0, 0.0, 9.80665]
+        w = rate(t)
+        inward = np.cross((rate(t + h) - rate(t - h)) / (2.0 * h), lever) + np.cross(w, np.cross(w, lever))
+        return w, rotation.rotate(rotation.inverse(self._orientations(t)[sensor]), force) - inward
+
+
+@pytest.fixture(scope="session")
+def pendulum():
+    """Return the maker of pendulums."""
+    return Pendulum
