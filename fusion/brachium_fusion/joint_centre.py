@@ -2,7 +2,7 @@
 
 Seen from either sensor the joint's centre is one point, so both must tell the same of its acceleration:
 
-    Z(d) (f_b - N_b r_b) = f_a - N_a r_a,   N = [alpha x] + [w x][w x]
+    Z(d) (f_b + N_b r_b) = f_a + N_a r_a,   N = [alpha x] + [w x][w x]
 
 with specific forces f, rates w and angular accelerations alpha in each sensor's world, r from sensor to joint
 in sensor axes, and Z(d) the turn of b's world into a's (Seel, Raisch and Schauer 2014 find r so; with
@@ -126,11 +126,11 @@ class _Rows:
     def _linear(self, x: Floats) -> tuple[Floats, Floats]:
         """Return the residuals (n, 3) in standard deviations and their derivatives (n, 3, 6 + k)."""
         turn = rotation.to_matrix(rotation.about(2, self._share @ x[6:]))
-        seen_b = np.einsum("nij,nj->ni", turn, self._force_b - self._turning_b @ x[3:6])
-        residual = seen_b - (self._force_a - self._turning_a @ x[:3])
+        seen_b = np.einsum("nij,nj->ni", turn, self._force_b + self._turning_b @ x[3:6])
+        residual = seen_b - (self._force_a + self._turning_a @ x[:3])
         design = np.zeros((len(residual), 3, len(x)))
-        design[..., :3] = self._turning_a
-        design[..., 3:6] = -turn @ self._turning_b
+        design[..., :3] = -self._turning_a
+        design[..., 3:6] = turn @ self._turning_b
         quarter = np.stack([-seen_b[:, 1], seen_b[:, 0], np.zeros(len(seen_b))], axis=-1)
         design[..., 6:] = quarter[..., None] * self._share[:, None, :]
         return residual * self._weight[:, None], design * self._weight[:, None, None]
