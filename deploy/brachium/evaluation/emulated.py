@@ -54,7 +54,8 @@ class Emulated:
     @cached_property
     def session(self) -> SessionArrays:
         """Return readings and truth on the grid of the trial's rate."""
-        return session_arrays(self.trial.settings(), self.begin_s + self.trial.seconds)
+        trial = self.trial
+        return session_arrays(trial.settings(), self.begin_s + trial.seconds, raw=trial.uncalibrated)
 
     @property
     def truth(self) -> ArmArrays:
@@ -87,22 +88,15 @@ class Emulated:
     def write(self, folder: Path) -> None:
         """Write the recording as a capture folder."""
         trial, time_s = self.trial, self.session.time_s
-        left_out: dict[Segment, SensorArrays] = {}
-        if trial.uncalibrated:
-            left_out = session_arrays(trial.settings(), self.begin_s + trial.seconds, raw=True).sensors
         segments: dict[Segment, captures.CaptureSegment] = {}
         for name, sensor in self.sensors().items():
             there = kept(len(time_s), trial.loss, trial.burst, f"{trial.seed}/{name}")
-            acc, gyr, mag = (
-                getattr(left_out[name] if block in trial.uncalibrated else sensor, block)[there]
-                for block in ("acc", "gyr", "mag")
-            )
             segments[name] = captures.CaptureSegment(
                 t=time_s[there],
                 rate_hz=trial.rate_hz,
-                acc=acc,
-                gyr=gyr,
-                mag=mag if trial.magnetometer else None,
+                acc=sensor.acc[there],
+                gyr=sensor.gyr[there],
+                mag=sensor.mag[there] if trial.magnetometer else None,
             )
         captures.write(folder, capture_settings(self), segments)
 
@@ -130,7 +124,10 @@ def capture_settings(made: Emulated) -> CaptureSettings:
 def estimate(
     skeletons: list[Skeleton], time_s: Floats, side: Side, warnings: tuple[str, ...] = ()
 ) -> Estimate:
-    """Return skeletons of one arm as arrays on the grid `time_s` (n,), true time."""
+    """Return skeletons of one arm as arrays on the grid `time_s` (n,), true time.
+
+    While a segment is missing, what is assumed in its place is no estimate, and is left out.
+    """
     n = len(time_s)
     row_of = {round(1e6 * t): i for i, t in enumerate(time_s.tolist())}
     worn: tuple[str, ...] = ("sternum", *arm_segments(side))
@@ -141,13 +138,16 @@ def estimate(
         i = row_of.get(round(1e-3 * (skeleton.time_ns - from_capture.ZERO_NS)))
         if i is None or skeleton.side != side:
             continue
+        missing = any(pose.world_from_segment is None for pose in skeleton.segments.values())
         for name, pose in skeleton.segments.items():
             if pose.world_from_segment is not None:
                 segments[name][i] = pose.world_from_segment
         for joint, place in skeleton.positions.items():
-            positions[joint][i] = place
+            if not missing or skeleton.assumed.get(joint) != "assumed":
+                positions[joint][i] = place
         for column, value in skeleton.angles.items():
-            angles[column][i] = value
+            if not missing or skeleton.assumed.get(column) != "assumed":
+                angles[column][i] = value
         if skeleton.shoulder_shift is not None:
             shift[i] = skeleton.shoulder_shift
     return Estimate(

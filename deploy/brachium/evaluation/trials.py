@@ -13,7 +13,7 @@ from brachium_nodes.magnetism import Surroundings
 from brachium_nodes.places import Arrangement
 from brachium_nodes.script import Span
 from brachium_nodes.sensors import LEVELS, Level
-from brachium_nodes.session import SensorArrays
+from brachium_nodes.session import Reading, SensorArrays
 from brachium_nodes.wearer import WearerSettings
 from brachium_nodes.wearing import Wearing
 from brachium_wire.capture_settings import CalibrationSpans, Functional, Joint, JointName, Motion, Pose
@@ -44,7 +44,7 @@ class Trial:
     """Which part of the samples is lost."""
     burst: int = 1
     """How many at a time."""
-    uncalibrated: tuple[str, ...] = ()
+    uncalibrated: tuple[Reading, ...] = ()
     """Sensor calibrations left out: gyr, acc, mag."""
     assumed_angles_deg: tuple[tuple[str, float], ...] = ()
     """What the exercise states of joints that no sensor sees."""

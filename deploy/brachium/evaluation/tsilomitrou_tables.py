@@ -15,6 +15,7 @@ from brachium.evaluation.solving import word
 from brachium.evaluation.tables import Cell, Table
 from brachium.evaluation.trials import Trial, stated_angles
 from brachium_nodes.sensors import Level
+from brachium_nodes.session import Reading
 
 Floats = npt.NDArray[np.float64]
 
@@ -182,7 +183,7 @@ def _loss(context: Context, method: str, loss: float, burst: int, seed: int) -> 
     return _angle(context.emulated(trial), "theta4", method)
 
 
-LEFT_OUT: tuple[tuple[str, ...], ...] = ((), ("gyr",), ("acc",), ("mag",), ("gyr", "acc", "mag"))
+LEFT_OUT: tuple[tuple[Reading, ...], ...] = ((), ("gyr",), ("acc",), ("mag",), ("gyr", "acc", "mag"))
 
 
 def calibration_left_out(context: Context) -> list[Table]:
@@ -215,7 +216,7 @@ def calibration_left_out(context: Context) -> list[Table]:
     ]
 
 
-def _left_out(context: Context, method: str, left_out: tuple[str, ...], seed: int) -> list[float | None]:
+def _left_out(context: Context, method: str, left_out: tuple[Reading, ...], seed: int) -> list[float | None]:
     trial = replace(trial_of(context, EXPERIMENTS[0], "ideal", seed), uncalibrated=left_out)
     made = context.emulated(trial)
     found = np.degrees(made.solved(method).angles["theta4"][made.counts])
