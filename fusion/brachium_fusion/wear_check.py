@@ -100,15 +100,17 @@ def check_wear(
     With nodes on both arms give both passes. With one arm's, the nodes may all be on the other arm, which
     then moved instead of the one that was asked for.
     """
-    feelings = [(p.moved, {s: felt(r, p.spans, rate_hz) for s, r in p.records.items()}) for p in passes]
+    feelings: Feelings = [
+        (p.moved, {s: felt(r, p.spans, rate_hz) for s, r in p.records.items()}) for p in passes
+    ]
     for _, felt_now in feelings:
         if refused := _refusal(felt_now):
             return WearCheck(findings=(), refused=refused)
-    nominal = {s: r.nominal_mounting for s, r in passes[0].records.items()}
+    nominal: dict[Segment, Floats] = {s: r.nominal_mounting for s, r in passes[0].records.items()}
     distances = {"forearm": forearm_m - 0.03, "hand": forearm_m + 0.41 * hand_m}
     ways = [_assign(nominal, feelings, distances)]
     if len(passes) == 1:
-        mirrored = [(_OTHER[moved], felt_now) for moved, felt_now in feelings]
+        mirrored: Feelings = [(_OTHER[moved], felt_now) for moved, felt_now in feelings]
         ways.append(_assign(nominal, mirrored, distances))
     chosen = min(ways, key=lambda way: sum(seat.cost for seat in way.values()))
     return WearCheck(findings=tuple(_finding(s, chosen[s], nominal, len(passes)) for s in nominal))
