@@ -1,7 +1,8 @@
 """What is known of one arm before it moves: its joints' axes and centres as its sensors see them. Pure."""
 
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from collections.abc import Collection, Mapping
+from dataclasses import asdict, dataclass, replace
+from math import radians
 from typing import Any
 
 import numpy as np
@@ -22,6 +23,8 @@ ABOVE_EPICONDYLE_M, ABOVE_WRIST_M = 0.04, 0.03
 """Where sensors are worn as told: upper arm lateral, forearm dorsal, this far above the joint below."""
 OFF_UPPER_ARM_M, OFF_FOREARM_M, OFF_HAND_M = 0.04, 0.03, 0.02
 """From the segment's middle line to the chip."""
+UNSURE_AXIS = radians(10.0)
+"""An axis that is not known better than this binds nothing."""
 ON_HAND = 0.41
 """Of the hand's length: the middle of the third metacarpal."""
 
@@ -34,12 +37,22 @@ class ArmKnowledge:
     wrist: Joint | None = None
     model: ArmModel | None = None
     """For the shoulder's displacement; None without upper arm and forearm aligned."""
+    carrying_known: bool = False
+    """Movement showed the elbow's axes."""
+
+    def without_shoulder(self) -> "ArmKnowledge":
+        """Return the same without what the shoulder needs."""
+        return replace(self, model=None)
 
     def plain(self) -> list[Any]:
         """Return all of it as plain values that compare."""
         joints = [None if joint is None else _plain(joint) for joint in (self.elbow, self.wrist)]
         model = {} if self.model is None else asdict(self.model)
-        return [*joints, {k: v.tolist() if isinstance(v, np.ndarray) else v for k, v in model.items()}]
+        return [
+            *joints,
+            self.carrying_known,
+            {k: v.tolist() if isinstance(v, np.ndarray) else v for k, v in model.items()},
+        ]
 
 
 def _plain(joint: Joint) -> list[Any]:
@@ -48,15 +61,32 @@ def _plain(joint: Joint) -> list[Any]:
 
 
 def arm_knowledge(
-    side: Side, alignment: Alignment | None, lengths: ArmLengths, stated: Centres
+    side: Side,
+    alignment: Alignment | None,
+    lengths: ArmLengths,
+    stated: Centres,
+    magnetometers: Collection[str],
 ) -> ArmKnowledge:
-    """Return what is known of an arm's joints: as stated, else as its alignment has them."""
+    """Return what is known of an arm's joints: as stated, else as its alignment has them.
+
+    Axes that rest on a pose alone can be 10 deg off, and turn the heading between sensors as far: they are
+    used only where there is no magnetometer to do better.
+    """
     upper, forearm, hand = arm_segments(side)
-    return ArmKnowledge(
-        elbow=_joint("elbow", upper, forearm, side, alignment, lengths, stated),
-        wrist=_joint("wrist", forearm, hand, side, alignment, lengths, stated),
-        model=_model(side, alignment, lengths, stated),
-    )
+    elbow = _joint("elbow", upper, forearm, side, alignment, lengths, stated)
+    wrist = _joint("wrist", forearm, hand, side, alignment, lengths, stated)
+    found = {} if alignment is None else alignment.joints
+    shown = {name: f"{name}_{side[0]}" in found for name in ("elbow", "wrist")}
+    if elbow is not None and not shown["elbow"] and {upper, forearm} <= set(magnetometers):
+        elbow = _centre_only(elbow) if "elbow" in stated else None
+    if wrist is not None and not shown["wrist"] and {forearm, hand} <= set(magnetometers):
+        wrist = _centre_only(wrist) if "wrist" in stated else None
+    model = _model(side, alignment, lengths, stated)
+    return ArmKnowledge(elbow=elbow, wrist=wrist, model=model, carrying_known=shown["elbow"])
+
+
+def _centre_only(joint: Joint) -> Joint:
+    return replace(joint, axis_a=None, axis_b=None)
 
 
 def _model(side: Side, alignment: Alignment | None, lengths: ArmLengths, stated: Centres) -> ArmModel | None:
@@ -99,6 +129,8 @@ def _joint(
     from_a, from_b = (rotation.inverse(alignment.mounting[s]) for s in (a, b))
     told_a, told_b = levers(name, side, lengths)
     found = alignment.joints.get(f"{name}_{side[0]}")
+    if found is not None and max(found.axis_near_sd_rad, found.axis_far_sd_rad) > UNSURE_AXIS:
+        axes = 3  # movement did not show them: only where the joint is still binds the sensors
     axis_a = rotation.rotate(from_a, [0.0, 0.0, 1.0])
     axis_b = rotation.rotate(from_b, [0.0, 1.0, 0.0] if name == "elbow" else [1.0, 0.0, 0.0])
     return Joint(

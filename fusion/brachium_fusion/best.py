@@ -19,12 +19,12 @@ from brachium_fusion.best_material import Material, calibrated
 from brachium_fusion.best_spans import rows_of_spans
 from brachium_fusion.offline_orientation import smooth_orientation
 from brachium_fusion.pose import Alignment
-from brachium_fusion.rows import Row, Shift, rows_of
+from brachium_fusion.rows import Row, rows_of
 from brachium_fusion.sensor_to_segment import SensorRecord, Span, align_segments
 from brachium_fusion.session_terms import lengths_of
 from brachium_fusion.settings import Settings
 from brachium_fusion.subject import Instant, Subject
-from brachium_fusion.timeline import Reading
+from brachium_fusion.timeline import Reading, Shift
 from brachium_fusion.uniform import Uniform, grid, on_grid
 from brachium_wire.messages import Quality, Skeleton
 
@@ -146,7 +146,7 @@ def _finish(
         now = {s: column[i] for s, column in readings.items()}
         if any(now.values()):
             subject.reference_ns = time_ns  # headings are those of the whole recording: they do not age
-            instant = Instant(time_ns, now, time_ns, subject.alignment, subject.session)
+            instant = Instant(time_ns, now, time_ns, subject.alignment, subject.session, {})
             for row in rows_of(SUBJECT, subject, instant):
                 moved: Shift | None = shifts[row.side][i] if row.side in shifts else None
                 rows.append(row._replace(shift=moved))

@@ -13,10 +13,10 @@ from brachium_fusion.arm_knowledge import Centres, arm_knowledge
 from brachium_fusion.joint_model import Joint
 from brachium_fusion.joint_smoother import smooth_joint
 from brachium_fusion.pose import Alignment
-from brachium_fusion.rows import Shift
 from brachium_fusion.sensor_to_segment import Span
 from brachium_fusion.shoulder_model import NOT_OBSERVABLE_WITHOUT_STERNUM, ArmModel
 from brachium_fusion.shoulder_smoother import smooth_shoulder
+from brachium_fusion.timeline import Shift
 from brachium_fusion.uniform import Uniform
 
 Floats = npt.NDArray[np.float64]
@@ -75,7 +75,8 @@ def solve_arm(
     """Smooth one arm; the sensors' orientations in `tracked` are replaced by better ones."""
     solution = ArmSolution(side=side)
     upper, forearm, hand = arm_segments(side)
-    knowledge = arm_knowledge(side, alignment, lengths, stated)
+    magnetometers = [s for s, one in tracked.items() if one.magnetometer]
+    knowledge = arm_knowledge(side, alignment, lengths, stated, magnetometers)
     if knowledge.elbow is not None:
         _bind("elbow", knowledge.elbow, upper, forearm, tracked, rate_hz, solution)
     if alignment is not None and pose is not None and knowledge.model is not None:

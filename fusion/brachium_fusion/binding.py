@@ -11,11 +11,13 @@ from brachium_body.lengths import ArmLengths
 from brachium_body.segments import SIDES, Side, arm_segments
 from brachium_fusion.arm_knowledge import Centres, arm_knowledge
 from brachium_fusion.live_arm import LiveArm, SensorNow
+from brachium_fusion.live_shoulder import RestMean
 from brachium_fusion.pose import Alignment
-from brachium_fusion.timeline import Reading
-from brachium_fusion.track import SegmentTrack
+from brachium_fusion.timeline import Motion, Reading, Shift
+from brachium_fusion.track import STILL_RAD_S, SegmentTrack
 
 Floats = npt.NDArray[np.float64]
+Readings = dict[str, Reading | None]
 
 
 class Known(NamedTuple):
@@ -25,6 +27,8 @@ class Known(NamedTuple):
     lengths: ArmLengths
     stated: Centres
     tracks: Mapping[str, SegmentTrack]
+    shoulder: bool
+    """Follow the shoulder."""
 
 
 class Binding:
@@ -35,67 +39,93 @@ class Binding:
         """Of the instants."""
         self._revision = -1
         self._arms: dict[Side, tuple[Any, LiveArm]] = {}
+        self._rests: dict[str, RestMean] = {}
 
     def correct(
-        self, now: int, readings: dict[str, Reading | None], known: Known, revision: int
-    ) -> dict[str, Reading | None]:
-        """Return the readings at an instant, corrected where a joint tells more."""
+        self, now: int, readings: Readings, known: Known, revision: int
+    ) -> tuple[Readings, dict[Side, Shift]]:
+        """Return the readings at an instant, corrected where a joint tells more, and the shifts."""
         self._refresh(known, revision)
-        if not self._arms:
-            return readings
-        result = dict(readings)
-        for _, arm in self._arms.values():
-            sensors = _sensors(now, arm, readings, known)
-            for segment, turned in arm.step(now, sensors).items():
+        if not self._rests:
+            return readings, {}
+        motions = self._motions(now, readings, known)
+        result, shifts = dict(readings), dict[Side, Shift]()
+        for side, (_, arm) in self._arms.items():
+            sensors = {
+                segment: SensorNow(_turned(known.alignment, segment, readings[segment]), motions[segment])
+                for segment in arm.segments
+                if segment in motions
+            }
+            found = arm.step(now, sensors, self._rests)
+            if found.shift is not None:
+                shifts[side] = found.shift
+            for segment, turned in found.world_from_sensor.items():
                 reading = readings[segment]
                 assert reading is not None
                 q = rotation.multiply(_heading(known.alignment, segment, -1.0), turned)
                 result[segment] = reading._replace(before=q, after=q, fraction=0.0)
-        return result
+        return result, shifts
+
+    def _motions(self, now: int, readings: Readings, known: Known) -> dict[str, Motion]:
+        """Return the motion of every raw sensor that is there, and note who is still."""
+        motions = {}
+        for segment, rest in self._rests.items():
+            motion = None
+            if readings.get(segment) is not None:
+                motion = known.tracks[segment].timeline.motion_at(now)
+            if motion is None:
+                rest.see(np.zeros(3), still=False)
+            else:
+                motions[segment] = motion
+                rest.see(motion.gyr, still=float(motion.gyr @ motion.gyr) <= STILL_RAD_S**2)
+        return motions
 
     def _refresh(self, known: Known, revision: int) -> None:
         """Let arms about which something else is known now begin anew."""
         if revision == self._revision:
             return
         self._revision = revision
+        raw = {s: t for s, t in known.tracks.items() if not t.info.orientation_only}
+        magnetometers = frozenset(s for s, track in raw.items() if track.magnetometer)
+        turns = {} if known.alignment is None else known.alignment.heading
         for side in SIDES:
-            knowledge = arm_knowledge(side, known.alignment, known.lengths, known.stated)
             segments = arm_segments(side)
-            raw = {s for s in segments if s in known.tracks and not known.tracks[s].info.orientation_only}
-            magnetometers = frozenset(s for s in raw if known.tracks[s].magnetometer)
-            headings = [
-                0.0 if known.alignment is None else known.alignment.heading.get(s, 0.0) for s in segments
-            ]
-            basis = (knowledge.plain(), sorted(magnetometers), headings)
-            if len(raw) < 2:
+            knowledge = arm_knowledge(side, known.alignment, known.lengths, known.stated, magnetometers)
+            if not known.shoulder:
+                knowledge = knowledge.without_shoulder()
+            basis = (
+                knowledge.plain(),
+                [(s, s in raw, s in magnetometers, turns.get(s, 0.0)) for s in segments],
+            )
+            if sum(s in raw for s in segments) < 2:
                 self._arms.pop(side, None)
             elif side not in self._arms or self._arms[side][0] != basis:
                 self._arms[side] = basis, LiveArm(segments, knowledge, self.rate_hz, magnetometers)
+        worn = {s for side in self._arms for s in arm_segments(side) if s in raw}
+        self._rests = {s: self._rests.get(s) or RestMean() for s in sorted(worn)}
 
     def state(self, known: Known, revision: int) -> dict[str, Any]:
         """Return all that changes, as plain values."""
         self._refresh(known, revision)
-        return {side: arm.state() for side, (_, arm) in self._arms.items()}
+        return {
+            "arms": {side: arm.state() for side, (_, arm) in self._arms.items()},
+            "rests": {segment: rest.state() for segment, rest in self._rests.items()},
+        }
 
     def restore(self, state: dict[str, Any], known: Known, revision: int) -> None:
         """Go on as the arms whose state this is would have."""
         self._refresh(known, revision)
         for side, (_, arm) in self._arms.items():
-            arm.restore(state[side])
+            arm.restore(state["arms"][side])
+        for segment, rest in self._rests.items():
+            rest.restore(state["rests"][segment])
 
 
-def _sensors(
-    now: int, arm: LiveArm, readings: Mapping[str, Reading | None], known: Known
-) -> dict[str, SensorNow]:
-    sensors = {}
-    for segment in arm.segments:
-        reading = readings.get(segment)
-        motion = None if reading is None else known.tracks[segment].timeline.motion_at(now)
-        if reading is None or motion is None:
-            continue
-        q = rotation.slerp(reading.before, reading.after, reading.fraction)
-        sensors[segment] = SensorNow(rotation.multiply(_heading(known.alignment, segment, 1.0), q), motion)
-    return sensors
+def _turned(alignment: Alignment | None, segment: str, reading: Reading | None) -> Floats:
+    """Return the orientation (4,) at the instant, its heading as the pose set it."""
+    assert reading is not None
+    q = rotation.slerp(reading.before, reading.after, reading.fraction)
+    return rotation.multiply(_heading(alignment, segment, 1.0), q)
 
 
 def _heading(alignment: Alignment | None, segment: str, sign: float) -> Floats:

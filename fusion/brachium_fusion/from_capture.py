@@ -205,13 +205,13 @@ def _alignment(capture: Capture, settings: Settings) -> Alignment | None:
     wanted = times[times <= end_s + 1e-9]
     _begin(subject, capture, nanoseconds(wanted).tolist())
     row_of = {time_ns: row for row, time_ns in enumerate(nanoseconds(wanted).tolist())}
-    quats = {name: np.full((len(wanted), 4), np.nan) for name in capture.segments}
+    quats: dict[str, Floats] = {name: np.full((len(wanted), 4), np.nan) for name in capture.segments}
     for fed, samples in batches(capture, end_s):
         subject.feed(fed, samples)
         for instant in subject.instants():
             for name, reading in instant.readings.items():
                 if reading is not None:
-                    quats[name][row_of[instant.time_ns]] = reading.after  # type: ignore[index]
+                    quats[name][row_of[instant.time_ns]] = reading.after
     records = {
         name: SensorRecord(
             world_from_sensor=quats[name],

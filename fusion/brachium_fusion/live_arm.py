@@ -1,4 +1,4 @@
-"""What one arm's joints tell of its sensors' orientations, instant by instant. Pure, causal.
+"""What one arm's joints tell of its sensors' orientations, and how its shoulder moves. Pure, causal.
 
 A sensor alone does not know its heading well: a magnetometer errs by the field indoors, a gyroscope drifts.
 Two sensors on one joint know more together. Corrections are turns from the left, before the mounting.
@@ -12,8 +12,10 @@ import numpy.typing as npt
 
 from brachium_body import rotation
 from brachium_fusion.arm_knowledge import ArmKnowledge
+from brachium_fusion.humeral_rotation import HumeralRotation
 from brachium_fusion.joint_filter import JointEstimate, JointFilter
-from brachium_fusion.timeline import Motion
+from brachium_fusion.live_shoulder import LiveShoulder, RestMean
+from brachium_fusion.timeline import Motion, Shift
 
 Floats = npt.NDArray[np.float64]
 
@@ -23,6 +25,14 @@ class SensorNow(NamedTuple):
 
     world_from_sensor: Floats
     motion: Motion
+
+
+class ArmNow(NamedTuple):
+    """What is found of an arm at an instant."""
+
+    world_from_sensor: dict[str, Floats]
+    """(4,) of the segments about which a joint says something."""
+    shift: Shift | None
 
 
 class LiveArm:
@@ -35,62 +45,120 @@ class LiveArm:
         rate_hz: float,
         magnetometers: frozenset[str],
     ) -> None:
-        upper, forearm, hand = segments
-        pairs = (("elbow", upper, forearm, knowledge.elbow), ("wrist", forearm, hand, knowledge.wrist))
-        self._pairs = {
-            name: (a, b, JointFilter(joint, rate_hz, {a, b} <= magnetometers))
-            for name, a, b, joint in pairs
-            if joint is not None
-        }
+        self._upper, self._forearm, self._hand = segments
+        self._joints: dict[str, JointFilter] = {}
+        if knowledge.elbow is not None:
+            shared = {self._upper, self._forearm} <= magnetometers
+            self._joints["elbow"] = JointFilter(knowledge.elbow, rate_hz, shared)
+        if knowledge.wrist is not None:
+            shared = {self._forearm, self._hand} <= magnetometers
+            self._joints["wrist"] = JointFilter(knowledge.wrist, rate_hz, shared)
+        self._shoulder, self._humerus = None, None
+        model = knowledge.model
+        if model is not None:
+            self._shoulder = LiveShoulder(model, rate_hz, {self._upper, self._forearm} <= magnetometers)
+        if model is not None and knowledge.carrying_known:
+            self._humerus = HumeralRotation(model.carrying_rad, model.side)
+            self._sensor_from = model.sensor_from_upper_arm, model.sensor_from_forearm
         self._period_ns = 1e9 / rate_hz
         self._last_ns: dict[str, int] = {}
 
-    def __bool__(self) -> bool:
-        return bool(self._pairs)
-
     @property
-    def segments(self) -> frozenset[str]:
+    def segments(self) -> tuple[str, ...]:
         """Whose samples it wants."""
-        return frozenset(s for a, b, _ in self._pairs.values() for s in (a, b))
+        if "wrist" in self._joints:
+            return (self._upper, self._forearm, self._hand)
+        return (self._upper, self._forearm) if self._joints or self._shoulder is not None else ()
 
-    def step(self, now: int, sensors: Mapping[str, SensorNow]) -> dict[str, Floats]:
-        """Return corrected world_from_sensor (4,) of the segments about which a joint says something."""
+    def step(self, now: int, sensors: Mapping[str, SensorNow], rests: Mapping[str, RestMean]) -> ArmNow:
+        """Return what the joints tell at an instant, of the sensors that are there."""
         found: dict[str, Floats] = {}
-        for name, (a, b, joint_filter) in self._pairs.items():
-            if a not in sensors or b not in sensors:
-                continue
-            estimate = self._joint_step(name, now, joint_filter, sensors[a], sensors[b])
-            if a in found:  # the joint above has turned it already: the rest of the arm turns with it
-                turn = rotation.heading(rotation.multiply(found[a], rotation.inverse(estimate.world_from_a)))
-                found[b] = rotation.multiply(rotation.about(2, turn), estimate.world_from_b)
+        shift = None
+        upper, forearm, hand = self._upper, self._forearm, self._hand
+        if upper in sensors and forearm in sensors:
+            found[upper], found[forearm] = self._elbow(now, sensors[upper], sensors[forearm])
+            shift = self._follow_shoulder(now, found, sensors, rests)
+            if self._humerus is not None:
+                found[upper] = self._untwisted(found[upper], found[forearm])
+        if "wrist" in self._joints and forearm in sensors and hand in sensors:
+            estimate = self._joint_step("wrist", now, sensors[forearm], sensors[hand])
+            if forearm in found:  # the elbow has turned it already: the hand turns with it
+                turn = rotation.multiply(found[forearm], rotation.inverse(estimate.world_from_a))
+                about_up = rotation.about(2, rotation.heading(turn))
+                found[hand] = rotation.multiply(about_up, estimate.world_from_b)
             else:
-                found[a], found[b] = estimate.world_from_a, estimate.world_from_b
-        return found
+                found[forearm], found[hand] = estimate.world_from_a, estimate.world_from_b
+        return ArmNow(found, shift)
 
-    def _joint_step(
-        self, name: str, now: int, joint_filter: JointFilter, a: SensorNow, b: SensorNow
-    ) -> JointEstimate:
-        missing_ns = now - self._last_ns.get(name, now) - self._period_ns
-        self._last_ns[name] = now
-        return joint_filter.step(
+    def _elbow(self, now: int, upper: SensorNow, forearm: SensorNow) -> tuple[Floats, Floats]:
+        if "elbow" not in self._joints:
+            return upper.world_from_sensor, forearm.world_from_sensor
+        estimate = self._joint_step("elbow", now, upper, forearm)
+        return estimate.world_from_a, estimate.world_from_b
+
+    def _follow_shoulder(
+        self,
+        now: int,
+        found: dict[str, Floats],
+        sensors: Mapping[str, SensorNow],
+        rests: Mapping[str, RestMean],
+    ) -> Shift | None:
+        """Put better orientations into `found`; return the shift, None while it is not known."""
+        if self._shoulder is None:
+            return None
+        upper, forearm = self._upper, self._forearm
+        estimate = self._shoulder.step(
+            (found[upper], found[forearm]),
+            (sensors[upper].motion, sensors[forearm].motion),
+            (rests[upper], rests[forearm]),
+            self._missing_s("shoulder", now),
+        )
+        if estimate is None or not estimate.valid:
+            return None
+        found[upper], found[forearm] = estimate.world_from_upper, estimate.world_from_forearm
+        return Shift(estimate.shift_m, np.sqrt(np.diag(estimate.covariance)))
+
+    def _untwisted(self, upper: Floats, forearm: Floats) -> Floats:
+        """Return the upper-arm sensor's orientation as if it had followed the humerus about its length."""
+        assert self._humerus is not None
+        from_upper, from_forearm = self._sensor_from
+        bone = self._humerus.correct(
+            rotation.multiply(upper, from_upper)[None], rotation.multiply(forearm, from_forearm)[None]
+        )[0]
+        return rotation.multiply(bone, rotation.inverse(from_upper))
+
+    def _joint_step(self, name: str, now: int, a: SensorNow, b: SensorNow) -> JointEstimate:
+        return self._joints[name].step(
             a.world_from_sensor,
             b.world_from_sensor,
             a.motion.gyr,
             b.motion.gyr,
             a.motion.acc,
             b.motion.acc,
-            missing_s=1e-9 * missing_ns if missing_ns > 0.5 * self._period_ns else 0.0,
+            missing_s=self._missing_s(name, now),
         )
+
+    def _missing_s(self, name: str, now: int) -> float:
+        """Return for how long before this instant there were no samples for an estimator."""
+        missing_ns = now - self._last_ns.get(name, now) - self._period_ns
+        self._last_ns[name] = now
+        return 1e-9 * missing_ns if missing_ns > 0.5 * self._period_ns else 0.0
 
     def state(self) -> dict[str, Any]:
         """Return all that changes, as plain values."""
         return {
-            "joints": {name: joint_filter.state() for name, (_, _, joint_filter) in self._pairs.items()},
+            "joints": {name: joint.state() for name, joint in self._joints.items()},
+            "shoulder": None if self._shoulder is None else self._shoulder.state(),
+            "humerus": None if self._humerus is None else self._humerus.state(),
             "last_ns": self._last_ns,
         }
 
     def restore(self, state: dict[str, Any]) -> None:
         """Go on as the arm whose state this is would have."""
-        for name, (_, _, joint_filter) in self._pairs.items():
-            joint_filter.restore(state["joints"][name])
+        for name, joint in self._joints.items():
+            joint.restore(state["joints"][name])
+        if self._shoulder is not None:
+            self._shoulder.restore(state["shoulder"])
+        if self._humerus is not None:
+            self._humerus.restore(state["humerus"])
         self._last_ns = dict(state["last_ns"])

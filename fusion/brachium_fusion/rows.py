@@ -12,7 +12,7 @@ from brachium_body.segments import SIDES, Side, arm_segments
 from brachium_fusion.pose import Alignment
 from brachium_fusion.session_terms import lengths_of, stated_angles
 from brachium_fusion.subject import Instant, Subject
-from brachium_fusion.timeline import Reading
+from brachium_fusion.timeline import Reading, Shift
 from brachium_wire.messages import Forward, Origin, Quality, Session
 
 Floats = npt.NDArray[np.float64]
@@ -25,13 +25,6 @@ WITHHOLD_DEG = 15.0
 """Angles that rest on heading are left out when it is less certain than this."""
 
 SLOTS: dict[Side, tuple[str, str, str, str]] = {side: ("sternum", *arm_segments(side)) for side in SIDES}
-
-
-class Shift(NamedTuple):
-    """Displacement of a shoulder since the pose, and its standard deviation: (3,) m in world axes."""
-
-    metres: Floats
-    sd: Floats
 
 
 class Row(NamedTuple):
@@ -69,7 +62,17 @@ def rows_of(subject_id: str, subject: Subject, instant: Instant) -> list[Row]:
             age_s = 1e-9 * (instant.time_ns - subject.reference_ns)
             uncertain = HEADING_SD_DEG + HEADING_DRIFT_DEG_S * age_s > WITHHOLD_DEG
         rows.append(
-            Row(subject_id, side, instant.time_ns, instant.received_ns, readings, qualities, frame, uncertain)
+            Row(
+                subject_id,
+                side,
+                instant.time_ns,
+                instant.received_ns,
+                readings,
+                qualities,
+                frame,
+                uncertain,
+                instant.shifts.get(side),
+            )
         )
     return rows
 

@@ -20,6 +20,9 @@ class Settings:
     joints: bool = True
     """With the filter `auto`: let sensors that share a joint correct one another."""
 
+    shoulder: bool = True
+    """With `joints`: follow the shoulder's displacement too."""
+
     @property
     def binds(self) -> bool:
         """Joints have a say; other filters stay as they were published."""

@@ -5,7 +5,7 @@ changes stamped with the instant from which they hold. So a recording of them gi
 """
 
 from collections import Counter, deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -16,11 +16,12 @@ import numpy.typing as npt
 from brachium_body.segments import SEGMENTS, Side
 from brachium_fusion.arm_knowledge import Centres
 from brachium_fusion.binding import Binding, Known
+from brachium_fusion.plain_samples import plain_samples, samples_of
 from brachium_fusion.pose import Alignment, PoseName, PoseSensor, align, pose_orientations
 from brachium_fusion.pose_watch import HeldPose, PoseWatch, PoseWish
 from brachium_fusion.session_terms import lengths_of
 from brachium_fusion.settings import Change, Settings
-from brachium_fusion.timeline import Reading
+from brachium_fusion.timeline import Reading, Shift
 from brachium_fusion.track import SegmentTrack
 from brachium_wire.codec import Drop
 from brachium_wire.messages import Calibration, Info, Session
@@ -47,6 +48,8 @@ class Instant(NamedTuple):
     received_ns: int
     alignment: Alignment | None
     session: Session
+    shifts: Mapping[Side, Shift]
+    """Of the shoulders that are followed."""
 
 
 class Subject:
@@ -210,14 +213,16 @@ class Subject:
             self._next_ns, self._done_ns = self._following(now), now
             self._apply_pending(now)
             self._watch_pose(now, readings)
+            shifts: dict[Side, Shift] = {}
             if self._settings.binds:
-                readings = self.binding.correct(now, readings, self._known(), self.revision)
+                readings, shifts = self.binding.correct(now, readings, self._known(), self.revision)
             yield Instant(
                 now,
                 readings,
                 max(r.received_ns for r in readings.values() if r is not None),
                 self.alignment,
                 self.session,
+                shifts,
             )
             solved = now
         if solved is not None:
@@ -274,7 +279,9 @@ class Subject:
         )
 
     def _known(self) -> Known:
-        return Known(self.alignment, lengths_of(self.session), self.stated, self.tracks)
+        return Known(
+            self.alignment, lengths_of(self.session), self.stated, self.tracks, self._settings.shoulder
+        )
 
     # -- changes and poses -------------------------------------------------------------------------------
 
@@ -353,7 +360,7 @@ class Subject:
             "done_ns": self._done_ns,
             "begun_ns": self._begun_ns,
             "refused": {s: msgspec.to_builtins(info) for s, info in self._refused.items()},
-            "unclaimed": {s: [_plain(b) for b in batches] for s, batches in self._unclaimed.items()},
+            "unclaimed": {s: [plain_samples(b) for b in row] for s, row in self._unclaimed.items()},
             "host": self._host,
             "pending": [[c.from_ns, c.kind, c.data] for c in self._pending],
             "watch": None if self._watch is None else self._watch.state(),
@@ -371,7 +378,7 @@ class Subject:
         self._done_ns, self._begun_ns = state["done_ns"], state["begun_ns"]
         self._refused = {s: msgspec.convert(info, Info) for s, info in state["refused"].items()}
         self._unclaimed = {
-            s: deque((_samples(b) for b in batches), WAITING_BATCHES)
+            s: deque((samples_of(b) for b in batches), WAITING_BATCHES)
             for s, batches in state["unclaimed"].items()
         }
         self._pending = [Change(*c) for c in state["pending"]]
@@ -390,20 +397,6 @@ class Subject:
         self.revision += 1
         if self._settings.binds:
             self.binding.restore(state["binding"], self._known(), self.revision)
-
-
-_BLOCKS = ("acc", "gyr", "mag", "quat")
-
-
-def _plain(samples: Samples) -> dict[str, Any]:
-    plain = msgspec.structs.asdict(samples)
-    return plain | {b: None if plain[b] is None else plain[b].tolist() for b in _BLOCKS}
-
-
-def _samples(plain: dict[str, Any]) -> Samples:
-    index = plain["mag_index"]
-    blocks = {b: _array(plain[b]) for b in _BLOCKS}
-    return Samples(**{**plain, **blocks, "mag_index": None if index is None else tuple(index)})
 
 
 def _array(values: Sequence[float] | None) -> Floats | None:

@@ -31,6 +31,13 @@ class Motion(NamedTuple):
     acc: Floats
 
 
+class Shift(NamedTuple):
+    """Displacement of a shoulder since the pose, and its standard deviation: (3,) m in world axes."""
+
+    metres: Floats
+    sd: Floats
+
+
 @dataclass(slots=True, eq=False)
 class Block:
     """A batch after the filter, and the last sample before it."""
