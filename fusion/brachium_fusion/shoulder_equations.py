@@ -11,6 +11,7 @@ from brachium_body import rotation
 from brachium_fusion import shoulder_increments as si
 from brachium_fusion.shoulder_arrow import Chain
 from brachium_fusion.shoulder_model import ArmModel, Bools, Floats, Sizes
+from brachium_fusion.shoulder_rest import runs
 from brachium_fusion.shoulder_tissue import UNKNOWNS, Tissue
 
 SIZE = 12
@@ -27,8 +28,10 @@ BROKEN = 1.0
 """m and m/s: by how much a person who walks may be elsewhere, and faster, a knot later."""
 GONE = 1e3
 """Times the noise of an interval with samples missing."""
-MISSING_TURN = 0.5
-"""rad/s: how fast a sensor may have turned unseen, more than it seemed."""
+MISSING_S = 0.5
+MISSING_TURN, MISSING_FORCE = 0.5, 1.0
+"""rad/s and m/s^2: by how much a sensor may have moved otherwise than a straight line across a gap of
+MISSING_S or more; less in a shorter one, with its square."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -66,6 +69,11 @@ class Stretch:
     broken: Bools
     """(k,) intervals in which more moves than a shoulder: nothing is expected of it there."""
     tissue: Tissue
+
+
+def missing_share(gap_s: float) -> float:
+    """Return the share of MISSING_TURN and MISSING_FORCE to expect in a gap."""
+    return min(1.0, (gap_s / MISSING_S) ** 2)
 
 
 def equations(
@@ -112,7 +120,8 @@ def _movement(
     constant[:, 12:, : si.CONSTANTS] = -inc.turn_by_constant
     sd[:, 12:] = sizes.gyro_noise * sqrt(h)
     sd[stretch.missing, 6:12] *= GONE
-    sd[stretch.missing, 12:] = MISSING_TURN * h
+    for first, last in runs(stretch.missing):
+        sd[first:last, 12:] = MISSING_TURN * missing_share((last - first) * h) * h
     chain.add_between(begin, end, constant, value, sd)
 
 
@@ -148,8 +157,7 @@ def _elbow(
     own[:, 0, 6:9], own[:, 0, 9:12] = turn, -turn
     upper = np.einsum("ki,kij->kj", turn, world_upper)
     forearm = -np.einsum("ki,kij->kj", turn, world_forearm)
-    constant[:, 0, si.SITS_UPPER : si.SITS_UPPER + 3] = upper
-    constant[:, 0, si.SITS_FOREARM : si.SITS_FOREARM + 3] = forearm
+    constant[:, 0, si.SITS] = np.concatenate([upper, forearm], axis=1)
     constant[:, 0, TISSUE] = stretch.tissue.spread(upper, forearm)
     value = model.hinge - np.einsum("ki,ki->k", flexion, along)
     sd = np.full((n, 1), sizes.hinge / sqrt(stretch.step_s))

@@ -9,10 +9,12 @@ from brachium_fusion import shoulder_increments as si
 from brachium_fusion.shoulder_equations import PLACE, SIZE, SPEED, TURNS
 from brachium_fusion.shoulder_model import Floats, Sizes
 
-STATE = SIZE + si.CONSTANTS
-"""A knot and the constants, as in the smoother; tissue is left to `mounting`, which forgets."""
+HELD = si.SITS.stop
+"""Constants of the filter: lever arms are left to noise, skin to how a sensor sits, which it forgets."""
+STATE = SIZE + HELD
+"""A knot and the constants."""
 CONSTANT = slice(SIZE, STATE)
-SITS = slice(SIZE + si.SITS_UPPER, STATE)
+SITS = slice(SIZE + si.SITS.start, STATE)
 SITS_S = 30.0
 """s: how a sensor sits is a new matter so often: skin follows the posture."""
 WALKS = np.concatenate(
@@ -40,7 +42,8 @@ class ErrorState:
         1 is as expected. Without `listen` accelerations are not believed.
         """
         h, size = float(inc.step_s[0]), self._size
-        turn, constant, drift = inc.by_turn[0], inc.by_constant[0], inc.turn_by_constant[0]
+        turn = inc.by_turn[0]
+        constant, drift = inc.by_constant[0, :, :HELD], inc.turn_by_constant[0, :, :HELD]
         step = np.eye(STATE)
         step[PLACE, SPEED] = h * np.eye(3)
         step[TURNS, CONSTANT] = drift
@@ -54,8 +57,8 @@ class ErrorState:
         moved = step @ self.covariance
         covariance = moved @ step.T + speed * (by_speed @ by_speed.T) + turned * (by_turn @ by_turn.T)
         diagonal = np.arange(SIZE, STATE)
-        covariance[diagonal[: si.SITS_UPPER], diagonal[: si.SITS_UPPER]] += h * WALKS**2
-        covariance[diagonal[si.SITS_UPPER :], diagonal[si.SITS_UPPER :]] += (1.0 - keep**2) * size.mounting**2
+        covariance[diagonal[: si.SITS.start], diagonal[: si.SITS.start]] += h * WALKS**2
+        covariance[diagonal[si.SITS.start :], diagonal[si.SITS.start :]] += (1.0 - keep**2) * size.mounting**2
         before, self.covariance = self.covariance, covariance
         known, self.mean = self.mean, step @ self.mean
         self.mean[SITS] += (keep - 1.0) * sits

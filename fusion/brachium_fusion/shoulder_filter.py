@@ -4,6 +4,8 @@ The same model as the smoother's, as an error-state Kalman filter: samples are i
 and covariances go from knot to knot.
 """
 
+from dataclasses import replace
+from math import hypot
 from typing import Any
 
 import numpy as np
@@ -11,15 +13,8 @@ import numpy as np
 from brachium_body import rotation
 from brachium_fusion import shoulder_hearing as hearing
 from brachium_fusion import shoulder_increments as si
-from brachium_fusion.shoulder_equations import (
-    MISSING_TURN,
-    NEAR_REST_S,
-    PLACE,
-    SIZE,
-    SPEED,
-    TURNS,
-)
-from brachium_fusion.shoulder_errors import ErrorState
+from brachium_fusion.shoulder_equations import NEAR_REST_S, PLACE, SIZE, SPEED, TURNS
+from brachium_fusion.shoulder_errors import HELD, ErrorState
 from brachium_fusion.shoulder_model import ArmModel, Floats, ShoulderEstimate, Sizes, sizes
 from brachium_fusion.shoulder_strapdown import Ahead
 from brachium_fusion.shoulder_watch import Watch
@@ -30,11 +25,14 @@ LONGEST_GAP_S = 0.3
 UNKNOWN_M = 0.1
 LOST_HEADING = 0.1
 """rad: of each sensor after a time that made no sense."""
-SITS_CONSTANTS = slice(si.SITS_UPPER, si.CONSTANTS)
 
 
 class ShoulderFilter:
-    """Follows one arm from a rest on; `step` takes both sensors' samples of one instant."""
+    """Follows one arm from a rest on; `step` takes both sensors' samples of one instant.
+
+    It begins, and begins again after a movement that is no shoulder's, by taking 0.16 s of samples at rest
+    for gravity.
+    """
 
     def __init__(
         self,
@@ -48,10 +46,11 @@ class ShoulderFilter:
         heading_sd_rad: float | None = None,
     ) -> None:
         self._model, self._period, self._every = model, 1.0 / rate_hz, si.stride(rate_hz)
-        self._size: Sizes = sizes(model)
+        size = sizes(model)
+        self._size: Sizes = replace(size, lever=hypot(size.lever, model.lever_sd_m))
         self._heading_sd = heading_sd_rad
         self._world: Floats = np.stack([world_from_upper, world_from_forearm]).astype(np.float64)
-        self._constants = np.zeros(si.CONSTANTS)
+        self._constants = np.zeros(HELD)
         self._constants[0:3], self._constants[12:15] = gyro_bias_upper, gyro_bias_forearm
         self._errors = ErrorState(self._size)
         self._watch = Watch(self._size, self._world.copy())
@@ -96,7 +95,7 @@ class ShoulderFilter:
 
     def _stand(self) -> None:
         """Begin to look ahead from what is held at the knot."""
-        c = self._constants[: si.SITS_UPPER].reshape(2, 4, 3)
+        c = self._constants[: si.SITS.start].reshape(2, 4, 3)
         self._scale, self._bias = (1.0 - c[:, 2:]).reshape(12), c[:, :2].reshape(12)
         self._now = fitted_model(self._model, self._constants)
         self._ahead.begin(
@@ -132,7 +131,7 @@ class ShoulderFilter:
         slow = hearing.slow(errors, self._size, self._speed, h)
         self._at_rest = watch.see(inc.velocity[0], fastest, h, slow=slow)
         listen = not watch.reason
-        sits = self._constants[si.SITS_UPPER :]
+        sits = self._constants[si.SITS]
         near = watch.since_rest_s < NEAR_REST_S
         if listen and self._at_rest:
             hearing.rest(errors, self._size, self._speed, rates.ravel(), watch.rest_s, h)
@@ -176,8 +175,7 @@ class ShoulderFilter:
 
     def _gap(self, missing_s: float, row: Floats, given: Floats | None) -> None:
         """Go over a time without samples: a short one as if they lay on a straight line to `row`."""
-        sd = np.repeat([0.5 * missing_s**2, missing_s, MISSING_TURN * missing_s, MISSING_TURN * missing_s], 3)
-        self._errors.widen(slice(0, SIZE), sd**2)
+        hearing.gap(self._errors, missing_s)
         if missing_s > LONGEST_GAP_S:
             self._watch.stop("samples were missing for too long")
         elif self._ahead.rows:
@@ -208,12 +206,8 @@ class ShoulderFilter:
     def _estimate(self, given: Floats | None) -> ShoulderEstimate:
         ahead, reason = self._ahead, self._watch.reason
         world = np.array(ahead.rows[-1][:8]).reshape(2, 4) if ahead.rows else self._world
-        if reason and given is not None:
-            world = given
-        else:
-            world = rotation.multiply(
-                world, rotation.from_rotation_vector(self._constants[SITS_CONSTANTS].reshape(2, 3))
-            )
+        sits = rotation.from_rotation_vector(self._constants[si.SITS].reshape(2, 3))
+        world = given if reason and given is not None else rotation.multiply(world, sits)
         since = self._period * max(len(ahead.rows) - 1, 0)
         go = np.concatenate([np.eye(3), since * np.eye(3)])
         spread = go.T @ self._errors.covariance[:6, :6] @ go

@@ -3,7 +3,7 @@
 import numpy as np
 
 from brachium_body import rotation
-from brachium_fusion.shoulder_equations import PLACE, SPEED
+from brachium_fusion.shoulder_equations import MISSING_FORCE, MISSING_TURN, PLACE, SIZE, SPEED, missing_share
 from brachium_fusion.shoulder_errors import SITS, STATE, ErrorState
 from brachium_fusion.shoulder_model import MOST_SCALE, ArmModel, Floats, Sizes, gravity_scale, levelled
 from brachium_fusion.shoulder_postures import Posture
@@ -97,3 +97,10 @@ def heading(errors: ErrorState, world_from: Floats, given: Floats, sd_rad: float
     rows[0, 8] = rows[1, 11] = 1.0
     turn = rotation.heading(rotation.multiply(given, rotation.inverse(world_from)))
     errors.observe(rows, turn, np.full(2, sd_rad**2 * HEADING_S / step_s))
+
+
+def gap(errors: ErrorState, missing_s: float) -> None:
+    """Know less after a time without samples, over which they are taken to lie on a straight line."""
+    speed = MISSING_FORCE * missing_share(missing_s) * missing_s
+    turn = MISSING_TURN * missing_share(missing_s) * missing_s
+    errors.widen(slice(0, SIZE), np.repeat([0.5 * missing_s * speed, speed, turn, turn], 3) ** 2)

@@ -16,10 +16,11 @@ from brachium_fusion.shoulder_model import GRAVITY, ArmModel, Floats, cross_matr
 KNOT_S = 0.16
 """Distance of knots, about: movement of a shoulder has little above 3 Hz."""
 
-CONSTANTS = 30
+CONSTANTS = 39
 """Gyro bias, accelerometer bias, gyro scale, accelerometer scale (3 each) of the upper arm's sensor, the same
-of the forearm's, then how each sits (3 each, rotation vectors in its axes)."""
-SITS_UPPER, SITS_FOREARM = 24, 27
+of the forearm's; how each sits (3 each, rotation vectors in its axes); the lever arms as _SENSOR has them (3
+each, m)."""
+SITS, LEVERS = slice(24, 30), slice(30, 39)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -159,7 +160,9 @@ def _levers(
     speed = -np.einsum("lkij,lkj->lki", across, rate)
     turned = -cross_matrix(speed)
     by_rate = np.diff(across * rate[:, :, None, :], axis=1)
-    by_sitting = np.diff(world @ cross_matrix(rate) @ arm, axis=1)
+    turning = world @ cross_matrix(rate)
+    by_sitting = np.diff(turning @ arm, axis=1)
+    by_lever = np.diff(turning * _SIGN[:, None, None, None], axis=1)
     gained, by_bias = np.diff(speed, axis=1), np.diff(across, axis=1)
     for lever, (sensor, at) in enumerate(zip(_SENSOR.tolist(), _ROW, strict=True)):
         row, turn, first = slice(at, at + 3), 3 * sensor, 12 * sensor
@@ -168,7 +171,9 @@ def _levers(
         by_turn[:, row, 6 + turn : 9 + turn] += turned[lever, 1:]
         by_constant[:, row, first : first + 3] += by_bias[lever]
         by_constant[:, row, first + 6 : first + 9] += by_rate[lever]
-        by_constant[:, row, SITS_UPPER + turn : SITS_UPPER + turn + 3] -= by_sitting[lever]
+        sits, arm_at = SITS.start + turn, LEVERS.start + 3 * lever
+        by_constant[:, row, sits : sits + 3] -= by_sitting[lever]
+        by_constant[:, row, arm_at : arm_at + 3] += by_lever[lever]
 
 
 def _weighted(values: Floats, every: int, period_s: float) -> tuple[Floats, Floats, Floats]:

@@ -48,6 +48,9 @@ class ArmModel:
     carrying_rad: float = 0.0
     """The elbow's angle about X, ISB's sign (valgus negative), the same on both sides."""
     side: Side = "right"
+    lever_sd_m: float = 0.01
+    """How well lengths and lever arms are known, along each axis: 3 mm measured on the bone, 10 mm with a
+    tape between landmarks, 20 mm from body height."""
     soft_tissue: bool = True
     """Worn on skin; False: fixed to the bone, as only an emulator or a test rig can be."""
 

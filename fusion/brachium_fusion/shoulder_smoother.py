@@ -4,7 +4,7 @@ The error-state smoother of two sensors, solved as least squares over knots (sho
 recordings are solved in windows, each begun from what the one before made of the same instant.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -26,6 +26,10 @@ from brachium_fusion.shoulder_postures import Postures
 from brachium_fusion.shoulder_window import Known, carried, samples, solve
 
 WINDOW_S, OVERLAP_S = 60.0, 6.0
+IMPLAUSIBLE = 3.0
+"""No sensor sits farther, in standard deviations, from where the pose put it."""
+LEAST_M = 1e-4
+"""No lever arm is known better."""
 
 Pair = tuple[Floats, Floats]
 
@@ -78,7 +82,7 @@ def smooth_shoulder(
             "give a slice in which the arm hangs still"
         )
     size = sizes(model)
-    known = _begin(size, held, (world_from_upper[first:end], world_from_forearm[first:end]))
+    known = _begin(size, model.lever_sd_m, held, (world_from_upper[first:end], world_from_forearm[first:end]))
     postures = Postures(known.world_from)
     every = si.stride(rate_hz)
     window, overlap = (round(s * rate_hz / every) * every for s in (WINDOW_S, OVERLAP_S))
@@ -91,6 +95,8 @@ def smooth_shoulder(
         data = [_padded(part[at:stop], every) for sensor in (upper, forearm) for part in sensor]
         trunk = None if trunk_velocity is None else _padded(trunk_velocity[at:stop], every)
         one = solve(model, size, rate_hz, data, known, postures, trunk)
+        if one.sits_rad > IMPLAUSIBLE * size.mounting:
+            one = solve(model, _doubtful(size), rate_hz, data, known.rigid(), postures, trunk)
         rows = slice(at, stop)
         shift[rows], sd[rows], turned[:, rows], at_rest[rows], valid[rows] = samples(one, every, stop - at)
         if stop == n:
@@ -103,7 +109,7 @@ def smooth_shoulder(
     return ShoulderTrajectory(shift, sd, turned[0], turned[1], at_rest, valid)
 
 
-def _begin(size: Sizes, held: list[Floats], orientations: Pair) -> Known:
+def _begin(size: Sizes, lever_sd: float, held: list[Floats], orientations: Pair) -> Known:
     world = []
     constants = np.zeros(POSTURES)
     for i, measured in enumerate(orientations):
@@ -119,8 +125,15 @@ def _begin(size: Sizes, held: list[Floats], orientations: Pair) -> Known:
         constants[12 * i + 9 : 12 * i + 12] = scale
     knot_sd = np.array([1e-4] * 3 + [1e-3] * 3 + [size.tilt, size.tilt, size.heading] * 2)
     one = np.repeat([size.gyro_bias, size.accel_bias, size.gyro_scale, size.accel_scale], 3)
-    sd = np.concatenate([one, one, np.full(6, size.mounting), np.full(POSTURES - 30, size.tissue)])
+    skin = np.full(POSTURES - si.CONSTANTS, size.tissue)
+    sd = np.concatenate([one, one, np.full(6, size.mounting), np.full(9, max(lever_sd, LEAST_M)), skin])
     return Known(np.array(world), np.zeros(SIZE), knot_sd, constants, sd, sd)
+
+
+def _doubtful(size: Sizes) -> Sizes:
+    """Return the sizes for a movement that contradicts the model of the arm: something that it does not know
+    of, a trunk that moves or wrong lengths, must not be taken for a sensor that sits otherwise."""
+    return replace(size, accel_noise=5.0 * size.accel_noise, lever=5.0 * size.lever)
 
 
 def _padded(values: Floats, every: int) -> Floats:

@@ -22,6 +22,7 @@ FADE_S = 15.0
 EARLY_S = 0.3
 """Enough to show the rest of a shoulder that is slow and does not accelerate."""
 
+AGAIN_S = 10.0
 STEP_BACK = "hold the back still and let the arm rest for a second"
 
 
@@ -40,7 +41,8 @@ class Watch:
         """Accelerations by both sensors and the faster sensor's rate in the last intervals."""
         self._loud, self._apart = 0.0, 1.0
         self._known = [Posture(world_from, np.zeros(3), np.zeros(3))]
-        self._tied = True
+        self._tie_at = AGAIN_S
+        """How long the rest must have lasted for the next tie."""
 
     def see(self, speed_gained: Floats, fastest: float, step_s: float, *, slow: bool) -> bool:
         """Take the interval that ended: (6,) m/s, rad/s, and whether the shoulder was slow as it began.
@@ -55,7 +57,7 @@ class Watch:
         self.rest_s = self.rest_s + step_s if rest else 0.0
         self.since_rest_s = 0.0 if rest else self.since_rest_s + step_s
         if not rest:
-            self._tied = False
+            self._tie_at = 0.0
         share = 1.0 - exp(-step_s / LISTEN_S)
         acceleration = 0.5 * (seen[-1, :3] + seen[-1, 3:6])
         self._loud += share * (float(acceleration @ acceleration) - self._loud)
@@ -83,7 +85,7 @@ class Watch:
         """Return whether a rest long enough ends what made no sense; it does so once."""
         if not self.reason or self.rest_s < RECOVER_S:
             return False
-        self.reason, self._apart, self._loud, self._tied = "", 1.0, 0.0, False
+        self.reason, self._apart, self._loud, self._tie_at = "", 1.0, 0.0, 0.0
         return True
 
     def stop(self, reason: str) -> None:
@@ -92,13 +94,13 @@ class Watch:
         self._recent, self.rest_s = [], 0.0
 
     def tie(self, world_from: Floats, place: Floats, sd: Floats) -> Posture | None:
-        """Return the posture, known before, in which the arm now rests; at most once a rest.
+        """Return the posture, known before, in which the arm now rests; once a rest, and every AGAIN_S of it.
 
         `world_from` (2, 4) are the sensors' orientations, `place` (3,) m where the shoulder seems, `sd` (3,).
         """
-        if self._tied or self.rest_s == 0.0:
+        if self.rest_s == 0.0 or self.rest_s < self._tie_at:
             return None
-        self._tied = True
+        self._tie_at = self.rest_s + AGAIN_S
         for posture in self._known:
             if float(np.max(rotation.angle_between(posture.world_from, world_from))) < SAME_RAD:
                 near = float(np.linalg.norm(posture.place - place)) < NOT_BACK_M
@@ -118,13 +120,13 @@ class Watch:
             "recent": [list(row) for row in self._recent],
             "loud": self._loud,
             "apart": self._apart,
-            "tied": self._tied,
+            "tie_at": self._tie_at,
             "postures": [[p.world_from.tolist(), p.place.tolist(), p.sd.tolist()] for p in self._known],
         }
 
     def restore(self, state: dict[str, Any]) -> None:
         """Go on as the one whose state this is."""
-        self.reason, self._tied = state["reason"], state["tied"]
+        self.reason, self._tie_at = state["reason"], state["tie_at"]
         self.rest_s, self.since_rest_s, self.shift = state["rest_s"], state["since_rest_s"], state["shift"]
         self._recent = [list(row) for row in state["recent"]]
         self._loud, self._apart = state["loud"], state["apart"]

@@ -25,11 +25,11 @@ from brachium_fusion.shoulder_tissue import Tissue
 
 PASSES = 3
 """Of linearisation; the second knows how much the shoulder moves, and its rests."""
-SITS = slice(si.SITS_UPPER, si.CONSTANTS)
-LINEARISED = (np.arange(POSTURES) < si.CONSTANTS).astype(np.float64)
-"""The constants that the nominal movement is corrected by; those of the skin stay linear."""
+LINEARISED = (np.arange(POSTURES) < si.LEVERS.start).astype(np.float64)
+"""The constants that the nominal movement is corrected by; lever arms and skin stay linear."""
 CAREFUL = 1.5
 """Standard deviations are carried on larger by so much, for their correlations are not."""
+RIGID = 1e-4
 FORGET = 0.3
 """Of what was not known at the start is unknown again a window later: biases walk, straps move."""
 
@@ -49,6 +49,15 @@ class Known:
     first_sd: Floats
     """(POSTURES,) how they were known at the start of the recording."""
 
+    def rigid(self) -> "Known":
+        """Return the same of sensors that sit where the pose put them."""
+        sits = np.arange(POSTURES) >= si.SITS.start
+        return replace(
+            self,
+            constants=np.where(sits, 0.0, self.constants),
+            constants_sd=np.where(sits, RIGID, self.constants_sd),
+        )
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Window:
@@ -61,6 +70,12 @@ class Window:
     sensors: Floats
     """(2, n, 4) nominal orientations."""
     used: list[Posture]
+
+    @property
+    def sits_rad(self) -> float:
+        """How far the sensor that sits farthest from where the pose put it does so."""
+        total = (self.constants[si.SITS] + self.solution.constants[si.SITS]).reshape(2, 3)
+        return float(np.linalg.norm(total, axis=1).max())
 
 
 def solve(
@@ -83,7 +98,7 @@ def solve(
     walks = np.zeros(len(missing), dtype=bool)
     for number in range(PASSES):
         fitted = fitted_model(model, constants)
-        errors = constants[: si.SITS_UPPER].reshape(2, 4, 3)
+        errors = constants[: si.SITS.start].reshape(2, 4, 3)
         read = [si.Sensor(*filled[2 * i : 2 * i + 2], *errors[i]).corrected() for i in range(2)]
         sensors = np.stack([si.strapdown(read[i][0], world[i], period) for i in range(2)])
         inc = si.increments(
@@ -139,7 +154,7 @@ def _beside(missing: Bools) -> Bools:
 
 def fitted_model(model: ArmModel, constants: Floats) -> ArmModel:
     """Return the model with both sensors sitting as the constants say."""
-    upper, forearm = rotation.from_rotation_vector(constants[si.SITS_UPPER : si.CONSTANTS].reshape(2, 3))
+    upper, forearm = rotation.from_rotation_vector(constants[si.SITS].reshape(2, 3))
     return replace(
         model,
         sensor_from_upper_arm=rotation.multiply(upper, model.sensor_from_upper_arm),
@@ -164,8 +179,8 @@ def _remember(chain: Chain, known: Known, world: Floats, constants: Floats, used
 
 def samples(window: Window, every: int, n: int) -> tuple[Floats, Floats, Floats, Bools, Bools]:
     """Return displacement (n, 3), its sd (n, 3), orientations (2, n, 4), rest (n,) and whether no more than a
-    shoulder moves (n,), at a window's samples: cubic between knots for the displacement, straight for the errors
-    of orientation."""
+    shoulder moves (n,), at a window's samples: cubic between knots for the displacement, straight for the
+    errors of orientation."""
     solution, stretch = window.solution, window.stretch
     t = np.arange(n) / every
     i = np.minimum(t.astype(np.int64), len(stretch.missing) - 1)
@@ -174,7 +189,7 @@ def samples(window: Window, every: int, n: int) -> tuple[Floats, Floats, Floats,
     shift = (1.0 + 2.0 * s) * (1.0 - s) ** 2 * a[:, PLACE] + s * s * (3.0 - 2.0 * s) * b[:, PLACE]
     shift += h * s * (1.0 - s) * ((1.0 - s) * a[:, SPEED] - s * b[:, SPEED])
     sd = np.sqrt(np.einsum("kii->ki", solution.covariance[:, PLACE, PLACE]))
-    settled, left = window.constants[SITS].reshape(2, 3), solution.constants[SITS]
+    settled, left = window.constants[si.SITS].reshape(2, 3), solution.constants[si.SITS]
     on_bone = left + stretch.tissue.turns(solution.constants[TISSUE])
     error = np.concatenate([solution.knots[:, TURNS], on_bone], axis=1)
     error = (1.0 - s) * error[i] + s * error[i + 1]
