@@ -74,6 +74,15 @@ class ElbowSensors:
     nominal_forearm: Floats | None = None
 
 
+class FittedElbow(NamedTuple):
+    """An elbow before anything of it is refused."""
+
+    motion: JointMotion
+    centre: JointCentre | None
+    found: JointAxes
+    frames: ElbowFrames
+
+
 def find_elbow(
     sensors: ElbowSensors, pose: ElbowPose, spans: Sequence[ElbowSpan], rate_hz: float
 ) -> ElbowFound | Refused:
@@ -84,7 +93,7 @@ def find_elbow(
     refused: dict[str, str] = {}
     end = suffix(sensors.side)
     while True:
-        fitted = _fit(sensors, pose, spans, rate_hz)
+        fitted = fit_elbow(sensors, pose, spans, rate_hz)
         if isinstance(fitted, str):
             return Refused(reasons=refused | {f"elbow{end}": fitted})
         wrong = span_reasons(fitted.motion, fitted.found, fitted.frames, spans, rate_hz)
@@ -92,18 +101,32 @@ def find_elbow(
         spans = [span for place, span in enumerate(spans) if place not in wrong]
         if wrong and not any(kind in BENDING for kind, _, _ in spans):
             return Refused(reasons=refused)
-        if not wrong:
-            return _result(fitted, sensors, pose, refused)
+        if wrong:
+            continue
+        if degrees(fitted.found.axis_a_sd) > UNSURE_DEG and not any(kind == "free" for kind, _, _ in spans):
+            fitted = _wider(fitted, sensors, pose, spans, rate_hz)
+        return _result(fitted, sensors, pose, refused)
 
 
-class _Fitted(NamedTuple):
-    motion: JointMotion
-    centre: JointCentre | None
-    found: JointAxes
-    frames: ElbowFrames
+def _wider(
+    fitted: FittedElbow, sensors: ElbowSensors, pose: ElbowPose, spans: Sequence[ElbowSpan], rate_hz: float
+) -> FittedElbow:
+    """Return the elbow from all that was recorded near the spans.
+
+    Led movements of a still upper arm leave open where its axis points; what came between may show it.
+    """
+    margin, last = round(NEAR_S * rate_hz), len(sensors.upper.world_from_sensor)
+    first, end = min(s[1] for s in spans), max(s[2] for s in spans)
+    all_of_it = ("free", max(0, first - margin), min(last, end + margin))
+    wider = fit_elbow(sensors, pose, [all_of_it], rate_hz)
+    if isinstance(wider, str) or wider.found.axis_a_sd > fitted.found.axis_a_sd:
+        return fitted
+    return wider
 
 
-def _fit(sensors: ElbowSensors, pose: ElbowPose, spans: Sequence[ElbowSpan], rate_hz: float) -> _Fitted | str:
+def fit_elbow(
+    sensors: ElbowSensors, pose: ElbowPose, spans: Sequence[ElbowSpan], rate_hz: float
+) -> FittedElbow | str:
     """Return the elbow that fits the spans best, or why there is none."""
     rows = [(first, end) for _, first, end in spans]
     motion = joint_motion(sensors.upper, sensors.forearm, rows, rate_hz)
@@ -119,7 +142,7 @@ def _fit(sensors: ElbowSensors, pose: ElbowPose, spans: Sequence[ElbowSpan], rat
     judged = [(f, elbow_frames(seen, f, pose, sensors.side, *nominal)) for f in solutions]
     found, frames = min(judged, key=lambda pair: pair[0].cost - pair[1].merit)
     flexion, _ = elbow_angles(motion, found, frames, sensors.side)
-    return whole_reason(found, excursion_deg(flexion)) or _Fitted(motion, centre, found, frames)
+    return whole_reason(found, excursion_deg(flexion)) or FittedElbow(motion, centre, found, frames)
 
 
 def _priors(sensors: ElbowSensors, pose: ElbowPose, centre: JointCentre | None) -> AxisPriors:
@@ -139,7 +162,9 @@ def _priors(sensors: ElbowSensors, pose: ElbowPose, centre: JointCentre | None) 
     )
 
 
-def _result(fitted: _Fitted, sensors: ElbowSensors, pose: ElbowPose, refused: dict[str, str]) -> ElbowFound:
+def _result(
+    fitted: FittedElbow, sensors: ElbowSensors, pose: ElbowPose, refused: dict[str, str]
+) -> ElbowFound:
     motion, centre, found, frames = fitted
     end = suffix(sensors.side)
     near, far, _ = arm_segments(sensors.side)

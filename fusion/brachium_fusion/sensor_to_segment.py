@@ -8,9 +8,8 @@ with its reason and stays as the pose has it. Spans may be short guided movement
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from math import degrees, radians
-from typing import Literal
+from dataclasses import replace
+from math import radians
 
 import numpy as np
 import numpy.typing as npt
@@ -18,47 +17,23 @@ import numpy.typing as npt
 from brachium_body import rotation
 from brachium_body.segments import SIDES, Side, arm_segments
 from brachium_fusion.elbow_alignment import ElbowFound, ElbowSensors, Refused, find_elbow
+from brachium_fusion.free_pose import pose_from_movement
 from brachium_fusion.hand_alignment import hand_mounting, wrist_heading
 from brachium_fusion.joint_motion import SensorMotion
 from brachium_fusion.pose import POSES, Alignment, PoseName, PoseSensor, align, pose_orientations
 from brachium_fusion.segment_frames import ElbowPose
+from brachium_fusion.segment_records import SensorRecord, Span, SpanKind, check, held_pose, rows_of
+
+__all__ = ["SensorRecord", "Span", "SpanKind", "align_segments"]
 
 Floats = npt.NDArray[np.float64]
-SpanKind = Literal["n-pose", "table", "given", "elbow-flexion", "pronation", "free"]
 
-SWAY_LIMIT_DEG = 5.0
-"""A pose in which a sensor turned by more than this (rms) was not held."""
+NO_POSE = (
+    "no pose was held: zeros of flexion and pronation rest on the range of the movement "
+    "(straightest elbow 5 deg, middle of pronation 0) and forward on the arm's usual stance"
+)
 FLEXION_SD = {"n-pose": radians(5.0), "table": radians(3.0), "given": radians(2.0)}
 """How far the elbow's stated flexion is believed: told to hang, laid at a right angle, measured."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Span:
-    """Rows `first` to `end` (exclusive) of all records, and what the person did in them."""
-
-    kind: SpanKind
-    first: int
-    end: int
-    angles_deg: dict[str, float] = field(default_factory=dict)
-    """Of the pose `given`, by clinical names."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class SensorRecord:
-    """One sensor over the rows; NaN where nothing was measured. Rows of all records belong together."""
-
-    world_from_sensor: Floats
-    """(n, 4)."""
-    magnetometer: bool = False
-    """Its world is the common one; without, its heading is its own."""
-    nominal_mounting: Floats | None = None
-    """segment_from_sensor (4,) as the wearer was told to put it on; None when nothing is known."""
-    gyr: Floats | None = None
-    """(n, 3) rad/s; not used: rates are taken from the orientations."""
-    acc: Floats | None = None
-    """(n, 3) m/s^2, calibrated; finds the heading between sensors of a joint that is moved about. None for
-    sensors that deliver orientation only."""
-    mag: Floats | None = None
 
 
 def align_segments(
@@ -74,12 +49,14 @@ def align_segments(
     not show, Alignment.refused says why. Raises ValueError for spans outside the records and records of
     different lengths.
     """
-    _check(records, spans, rate_hz)
+    check(records, spans, rate_hz)
+    if spans and not any(span.kind in POSES for span in spans):
+        return _without_pose(records, spans, rate_hz, facing_deg)
     refused: dict[str, str] = {}
-    pose = _held_pose(records, spans, refused)
+    pose = held_pose(records, spans, refused)
     if pose is None:
         return Alignment(refused=refused, warnings=tuple(refused.values()))
-    still = {name: quats for name, record in records.items() if len(quats := _rows(record, pose)) > 0}
+    still = {name: quats for name, record in records.items() if len(quats := rows_of(record, pose)) > 0}
     elbows: dict[Side, ElbowFound] = {}
     for side in SIDES:
         found = _elbow(records, still, spans, pose, side, rate_hz)
@@ -91,47 +68,35 @@ def align_segments(
     return _joined(records, still, pose, spans, rate_hz, elbows, refused, facing_deg)
 
 
-def _check(records: Mapping[str, SensorRecord], spans: Sequence[Span], rate_hz: float) -> None:
-    lengths = {len(record.world_from_sensor) for record in records.values()}
-    if len(lengths) != 1:
-        raise ValueError(f"expected records of one length, got {sorted(lengths)} rows")
-    if not rate_hz > 0.0:
-        raise ValueError(f"expected a rate above 0, got {rate_hz} Hz")
-    (rows,) = lengths
-    for span in spans:
-        if not 0 <= span.first < span.end <= rows:
-            raise ValueError(
-                f"the span {span.kind} has rows {span.first} to {span.end}; records have {rows} rows"
-            )
-
-
-def _rows(record: SensorRecord, span: Span) -> Floats:
-    quats = record.world_from_sensor[span.first : span.end]
-    return quats[np.isfinite(quats[:, 0])]
-
-
-def _held_pose(
-    records: Mapping[str, SensorRecord], spans: Sequence[Span], refused: dict[str, str]
-) -> Span | None:
-    """Return the first pose in which all sensors were still; reasons of others go to `refused`."""
-    poses = [span for span in spans if span.kind in POSES]
-    if not poses:
-        refused["pose"] = "no pose among the spans: give n-pose, table or given, held still for some seconds"
-    for span in poses:
-        moved = []
-        for name, record in records.items():
-            quats = _rows(record, span)
-            if len(quats) == 0:
-                continue
-            sway = rotation.angle_between(rotation.mean(quats), quats)
-            sway_deg = degrees(float(np.sqrt(np.mean(sway**2))))
-            if sway_deg > SWAY_LIMIT_DEG:
-                moved.append(f"{name} by {sway_deg:.0f} deg")
-        if not moved:
-            refused.pop("pose", None)
-            return span
-        refused["pose"] = f"not still in the pose {span.kind}: {', '.join(moved)}; hold it for some seconds"
-    return None
+def _without_pose(
+    records: Mapping[str, SensorRecord], spans: Sequence[Span], rate_hz: float, facing_deg: float | None
+) -> Alignment:
+    """Return the alignment of each arm from its movement alone; hands and sternum stay as they are."""
+    found = Alignment(warnings=(NO_POSE,))
+    for side in SIDES:
+        upper, forearm, _ = arm_segments(side)
+        if upper not in records or forearm not in records:
+            continue
+        moving = [(span.kind, span.first, span.end) for span in spans]
+        pose = pose_from_movement(_elbow_sensors(records, side), moving, rate_hz)
+        if isinstance(pose, str):
+            found = replace(found, refused=found.refused | {f"elbow_{side[0]}": pose})
+            continue
+        angles = {"elbow_flexion": pose.elbow_flexion_deg, "forearm_pronation": pose.forearm_pronation_deg}
+        given = Span(kind="given", first=pose.row, end=pose.row + 1, angles_deg=angles)
+        arm: dict[str, SensorRecord] = {name: records[name] for name in (upper, forearm)}
+        one = align_segments(arm, [given, *spans], rate_hz, facing_deg=facing_deg)
+        found = replace(
+            one,
+            heading=found.heading | one.heading,
+            mounting=found.mounting | one.mounting,
+            assumed=found.assumed | one.assumed,
+            scores=found.scores | one.scores,
+            joints=found.joints | one.joints,
+            refused=found.refused | one.refused,
+            warnings=tuple(dict.fromkeys((*found.warnings, *one.warnings))),
+        )
+    return found
 
 
 def _elbow(
@@ -149,14 +114,7 @@ def _elbow(
     stated = _stated(pose)
     hanging = pose.kind == "n-pose"
     return find_elbow(
-        ElbowSensors(
-            side=side,
-            upper=_motion(records[upper]),
-            forearm=_motion(records[forearm]),
-            shared_heading=records[upper].magnetometer and records[forearm].magnetometer,
-            nominal_upper=records[upper].nominal_mounting,
-            nominal_forearm=records[forearm].nominal_mounting,
-        ),
+        _elbow_sensors(records, side),
         ElbowPose(
             upper_sensor=rotation.mean(still[upper]),
             forearm_sensor=rotation.mean(still[forearm]),
@@ -174,6 +132,18 @@ def _elbow(
 
 def _motion(record: SensorRecord) -> SensorMotion:
     return SensorMotion(world_from_sensor=record.world_from_sensor, acc=record.acc)
+
+
+def _elbow_sensors(records: Mapping[str, SensorRecord], side: Side) -> ElbowSensors:
+    upper, forearm = (records[name] for name in arm_segments(side)[:2])
+    return ElbowSensors(
+        side=side,
+        upper=_motion(upper),
+        forearm=_motion(forearm),
+        shared_heading=upper.magnetometer and forearm.magnetometer,
+        nominal_upper=upper.nominal_mounting,
+        nominal_forearm=forearm.nominal_mounting,
+    )
 
 
 def _stated(pose: Span) -> dict[str, float]:
