@@ -50,12 +50,13 @@ def broken(speed_change: Floats, step_s: float, place: Floats | None = None) -> 
     """
     mean = 0.5 * (speed_change[:, :3] + speed_change[:, 3:]) / step_s
     around = max(1, round(LISTEN_S / step_s)) | 1
-    loud = uniform_filter1d(np.square(mean).sum(axis=1), around, mode="nearest") > LOUDEST**2
+    power = uniform_filter1d(np.square(mean).sum(axis=1), around, mode="nearest")
+    loud: Bools = np.asarray(power > LOUDEST**2)
     if place is not None:
         far = np.linalg.norm(place, axis=1) > FARTHEST_M
-        loud |= far[1:] | far[:-1]
-    result: Bools = maximum_filter1d(loud, around, mode="nearest")
-    return result
+        loud = loud | far[1:] | far[:-1]
+    near: Floats = np.asarray(maximum_filter1d(loud.astype(np.float64), around, mode="nearest"))
+    return near > 0.5
 
 
 def _quiet(acceleration: Floats, fastest: Floats, width: int) -> Bools:
