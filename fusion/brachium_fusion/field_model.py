@@ -29,7 +29,7 @@ LAG_SD_S = 0.01
 INDEPENDENT_RAD = 0.5
 """A sensor has to turn this far before the field that it meets tells something new: deviations belong to
 places and attitudes, so that resting in one of them for a minute says no more than a moment does."""
-REST_SHARE = 0.02
+REST_SHARE = 0.003
 """What a moment of rest still counts for, as a part of what one of movement does."""
 MOVING_RAD_S = 0.1
 """At this mean rate the gyroscope's scale, and not its bias at rest, makes the heading drift."""

@@ -41,8 +41,8 @@ TILT_UNSETTLED = 0.02
 """rad: until then the field is learnt anew at every step, for a wrong tilt turns its vertical part over."""
 OFFSET_SD = 0.3
 """rad, at first: by hard iron that is not known yet."""
-FIELD_SD = 0.05
-"""Of the field's strength, at first, beside the tilt's."""
+FIELD_SD = 0.2
+"""Of the field's strength, at first, beside the tilt's: the place of the start may be a desk of steel."""
 HARD_IRON_SD = (0.01, 0.3)
 """Of the field's strength: what a calibration leaves, and what a magnet on the sensor does."""
 SOFT_IRON_SD = 0.01

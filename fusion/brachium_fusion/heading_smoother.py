@@ -27,11 +27,21 @@ from brachium_fusion.field_model import (
 Floats = npt.NDArray[np.float64]
 Bools = npt.NDArray[np.bool_]
 
-HARD_IRON_SD = 0.05
-"""Of the field's strength: a calibration leaves 1 uT, but a clasp or a battery near the sensor more."""
+HARD_IRON_SD = 0.02
+"""Of the field's strength: a calibration leaves 1 uT."""
+MAGNET_SD = 0.3
+"""Of the field's strength: what a magnet on the sensor does."""
+MAGNET_HINT = 0.03
+"""Hard iron above this is reason to allow for a magnet,"""
+MAGNET = 0.08
+"""and above this it is one,"""
+MAGNET_SURE = 5.0
+"""when it is so many times its standard deviation,"""
+MAGNET_FITS = 0.8
+"""and residuals have this weight on average (where all is well, above 1)."""
 SOFT_IRON_SD = 0.02
 """Also for deviations that go with the place, and so with the attitude."""
-FIELD_SD = 0.01
+FIELD_SD = 0.015
 """Of the field's strength: how it varies between places of an undisturbed room."""
 APART_S = 2.0
 """Deviations of the field keep together for about this long in movement."""
@@ -69,8 +79,22 @@ def fit_heading(steps: FieldSteps, pieces: list[slice], step_s: float) -> Headin
 
     At least one step has a magnetometer value.
     """
-    k = len(steps.field)
     strength = float(np.median(np.linalg.norm(steps.field[steps.share > 0.0], axis=1)))
+    fit, _, _ = _fit(steps, pieces, step_s, strength, HARD_IRON_SD)
+    if np.linalg.norm(fit.calibration[HARD_IRON]) > MAGNET_HINT * strength:
+        other, covariance, fits = _fit(steps, pieces, step_s, strength, MAGNET_SD)
+        size = float(np.linalg.norm(other.calibration[HARD_IRON]))
+        sd = float(np.sqrt(np.linalg.eigvalsh(covariance[HARD_IRON, HARD_IRON])[-1]))
+        if size > max(MAGNET * strength, MAGNET_SURE * sd) and fits > MAGNET_FITS:
+            return other
+    return fit
+
+
+def _fit(
+    steps: FieldSteps, pieces: list[slice], step_s: float, strength: float, hard_iron_sd: float
+) -> tuple[HeadingFit, Floats, float]:
+    """Return the fit, the calibration's covariance, and the mean weight of the residuals."""
+    k = len(steps.field)
     noise = FIELD_SD * strength
     sure = looks(steps.rate, step_s, APART_S) * steps.share
     drift = heading_variance(steps.rate, step_s)
@@ -78,7 +102,7 @@ def fit_heading(steps: FieldSteps, pieces: list[slice], step_s: float) -> Headin
     for piece in pieces[1:]:
         drift[piece.start - 1] = BREAK_VARIANCE
     sd = np.empty(CALIBRATION)
-    sd[0], sd[HARD_IRON], sd[SOFT_IRON] = LAG_SD_S, HARD_IRON_SD * strength, SOFT_IRON_SD
+    sd[0], sd[HARD_IRON], sd[SOFT_IRON] = LAG_SD_S, hard_iron_sd * strength, SOFT_IRON_SD
     prior = np.concatenate([np.zeros(2), 1.0 / sd**2])
     shared = np.zeros(2 + CALIBRATION)
     shared[:2] = _median_field(steps)
@@ -87,25 +111,27 @@ def fit_heading(steps: FieldSteps, pieces: list[slice], step_s: float) -> Headin
     jacobian[:, 2, 1] = 1.0
     jacobian[:, :, 2:] = steps.response
     weight = sure / noise**2  # for the first change; then by the residuals
+    trusted, information = np.ones(k), np.diag(prior)
     residual = _residual(steps, offset, shared)
     squared = np.einsum("ki,ki->k", residual, residual)
     for _ in range(MOST_STEPS):
         sine, cosine = np.sin(offset), np.cos(offset)
         jacobian[:, 0, 0], jacobian[:, 1, 0] = sine, cosine
-        change, shared_change = _solve(
+        change, shared_change, information = _solve(
             offset, shared, residual, weight, drift, prior, jacobian, shared[0] * np.stack([cosine, -sine], 1)
         )
         offset = offset + change
         shared = shared + shared_change
         residual = _residual(steps, offset, shared)
         squared = np.einsum("ki,ki->k", residual, residual)
-        weight = sure / noise**2 * ((FREEDOM + 3.0) / (FREEDOM + squared / noise**2))
+        trusted = (FREEDOM + 3.0) / (FREEDOM + squared / noise**2)
+        weight = sure / noise**2 * trusted
         if np.abs(change).max() < CONVERGED_RAD:
             break
     steps_wide = max(1, round(DISTURBED_S / step_s))
     share = np.maximum(uniform_filter1d(steps.share, steps_wide), 1e-9)
     level = uniform_filter1d(squared * steps.share, steps_wide) / share
-    return HeadingFit(
+    fit = HeadingFit(
         offset,
         shared[2:],
         float(shared[0]),
@@ -113,6 +139,8 @@ def fit_heading(steps: FieldSteps, pieces: list[slice], step_s: float) -> Headin
         residual,
         level > (DISTURBED * strength) ** 2,
     )
+    covariance = np.linalg.inv(information)[2:, 2:].astype(np.float64)
+    return fit, covariance, float(sure @ trusted / sure.sum())
 
 
 def _solve(
@@ -124,8 +152,9 @@ def _solve(
     prior: Floats,
     jacobian: Floats,
     turned: Floats,
-) -> tuple[Floats, Floats]:
-    """Return the Gauss-Newton change of the offsets and of what all steps share."""
+) -> tuple[Floats, Floats, Floats]:
+    """Return the Gauss-Newton change of the offsets and of what all steps share, and the latter's
+    information."""
     k, _, border = jacobian.shape
     weighted = jacobian * weight[:, None, None]
     band = np.zeros((2, k))
@@ -144,9 +173,10 @@ def _solve(
     corner_right = flat_weighted.T @ residual.ravel() - prior * shared
     solved = solveh_banded(band, right, check_finite=False)
     coupled = right[:, 1:].T @ solved
-    shared_change = np.linalg.solve(corner - coupled[:, 1:], corner_right - coupled[:, 0]).astype(np.float64)
+    information: Floats = corner - coupled[:, 1:]
+    shared_change = np.linalg.solve(information, corner_right - coupled[:, 0]).astype(np.float64)
     change: Floats = solved[:, 0] - solved[:, 1:] @ shared_change
-    return change, shared_change
+    return change, shared_change, information
 
 
 def _residual(steps: FieldSteps, offset: Floats, shared: Floats) -> Floats:

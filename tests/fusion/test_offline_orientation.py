@@ -75,6 +75,7 @@ def lag(mag, seconds: float):
 
 SPOILT = {
     "a clasp of iron on the sensor": lambda mag, _: mag + np.array([9.0, -10.0, 6.0]),
+    "a magnet on the sensor": lambda mag, _: mag + np.array([30.0, -25.0, 20.0]),
     "axes two degrees off": lambda mag, _: Rotation.from_rotvec([0.02, -0.03, 0.02]).apply(mag),
     "twenty milliseconds late": lambda mag, _: lag(mag, 0.02),
     "noise, and a little iron": lambda mag, rng: (
