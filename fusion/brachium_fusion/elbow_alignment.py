@@ -171,10 +171,11 @@ def _result(
     flexion, pronation = elbow_angles(motion, found, frames, sensors.side)
     turned = excursion_deg(pronation)
     if turned < LEAST_PRONATION_DEG:
-        refused[f"pronation{end}"] = (
-            f"the forearm turned by {turned:.0f} deg only, at least {LEAST_PRONATION_DEG:.0f} are needed: "
-            "its axis rests on gravity in the pose"
+        few = (
+            f"too little movement: the forearm turned by {turned:.0f} deg, at least "
+            f"{LEAST_PRONATION_DEG:.0f} are needed; its axis rests on gravity in the pose"
         )
+        refused.setdefault(f"pronation{end}", few)
     if degrees(found.heading_sd) > UNSURE_DEG and degrees(found.axis_a_sd) > UNSURE_DEG:
         refused[f"heading{end}"] = (
             "the upper arm was too still to tell where its flexion axis points: "

@@ -135,6 +135,7 @@ def _descend(equations: JointEquations, guess: Guess) -> tuple[float, Guess]:
 def _variances(equations: JointEquations, guess: Guess) -> Floats:
     residuals, jacobian = equations.linear(guess)
     information = jacobian.T @ (equations.weights(residuals)[:, None] * jacobian)
+    information += np.eye(len(information)) / np.pi**2  # no angle is less known than half a turn
     return np.array(np.diag(np.linalg.inv(information)), dtype=np.float64)
 
 

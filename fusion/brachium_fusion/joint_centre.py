@@ -29,6 +29,8 @@ LEVER_SD_M = 0.15
 HEADING_RATE_SD = radians(0.05)
 INDEPENDENT = 12.0
 """All instants together count as so many independent ones: skin's errors follow the movement."""
+LEAST_NOISE = 0.01
+"""Of FORCE_SD, squared: what an accelerometer's bias leaves, 3 mg."""
 LOSS_SCALE = 2.0
 STEPS = 10
 UNSEEN = radians(30.0)
@@ -107,7 +109,7 @@ class _Rows:
     def step(self, x: Floats) -> tuple[Floats, Floats]:
         """Return the Gauss-Newton step from x, and the covariance there."""
         residual, design = self._linear(x)
-        noise = max(1e-4, float(np.mean(_loss(residual)))) / 3.0
+        noise = max(LEAST_NOISE, float(np.mean(_loss(residual))) / 3.0)
         robust = 1.0 / np.sqrt(1.0 + np.einsum("ni,ni->n", residual, residual) / LOSS_SCALE**2)
         scale = robust * INDEPENDENT / (len(residual) * noise)
         normal = np.einsum("n,nij,nik->jk", scale, design, design)
