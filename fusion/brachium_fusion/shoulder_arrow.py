@@ -36,30 +36,46 @@ class Chain:
             np.zeros((constants + 1, constants + 1)),
         )
 
-    def add_between(self, begin: Floats, end: Floats, constant: Floats, value: Floats, sd: Floats) -> None:
-        """Add rows begin x_k + end x_(k+1) + constant c = value: (k, r, s), (k, r, s), (k, r, c), (k, r), sd
-        (k, r)."""
+    def add_between(
+        self, begin: Floats, end: Floats, constant: Floats | None, value: Floats, sd: Floats
+    ) -> None:
+        """Add rows begin x_k + end x_(k+1) + constant c = value: (k, r, s), (k, r, s), (k, r, c) or none,
+        (k, r), sd (k, r)."""
         s = begin.shape[2]
-        rows = np.concatenate([begin, end, constant, value[..., None]], axis=2) / sd[..., None]
-        gram = np.matmul(rows.transpose(0, 2, 1), rows)
+        gram, shared = self._grams(np.concatenate([begin, end], axis=2), constant, value, sd)
         self.own[:-1] += gram[:, :s, :s]
-        self.own[1:] += gram[:, s : 2 * s, s : 2 * s]
-        self.next[:] += gram[:, :s, s : 2 * s]
-        self.shared[:-1] += gram[:, :s, 2 * s :]
-        self.shared[1:] += gram[:, s : 2 * s, 2 * s :]
-        self.constants[:] += gram[:, 2 * s :, 2 * s :].sum(axis=0)
+        self.own[1:] += gram[:, s:, s:]
+        self.next[:] += gram[:, :s, s:]
+        first = self.shared.shape[2] - shared.shape[2]
+        self.shared[:-1, :, first:] += shared[:, :s]
+        self.shared[1:, :, first:] += shared[:, s:]
 
     def add_at(
-        self, knots: npt.NDArray[np.int64], own: Floats, constant: Floats, value: Floats, sd: Floats
+        self,
+        knots: npt.NDArray[np.int64],
+        own: Floats,
+        constant: Floats | None,
+        value: Floats,
+        sd: Floats,
     ) -> None:
-        """Add rows own x_k + constant c = value at the knots numbered (m,), each once: (m, r, s), (m, r, c),
-        (m, r), sd (m, r)."""
-        s = own.shape[2]
-        rows = np.concatenate([own, constant, value[..., None]], axis=2) / sd[..., None]
-        gram = np.matmul(rows.transpose(0, 2, 1), rows)
-        self.own[knots] += gram[:, :s, :s]
-        self.shared[knots] += gram[:, :s, s:]
-        self.constants[:] += gram[:, s:, s:].sum(axis=0)
+        """Add rows own x_k + constant c = value at the knots numbered (m,), each once: (m, r, s), (m, r, c)
+        or none, (m, r), sd (m, r)."""
+        gram, shared = self._grams(own, constant, value, sd)
+        self.own[knots] += gram
+        self.shared[knots, :, self.shared.shape[2] - shared.shape[2] :] += shared
+
+    def _grams(
+        self, own: Floats, constant: Floats | None, value: Floats, sd: Floats
+    ) -> tuple[Floats, Floats]:
+        """Return what rows give to knots (m, s, s) and between knots and the last constants; add to these."""
+        weight = 1.0 / sd[..., None]
+        own, right = own * weight, value[..., None] * weight
+        if constant is not None:
+            right = np.concatenate([constant * weight, right], axis=2)
+            flat = right.reshape(-1, right.shape[2])
+            self.constants[:] += flat.T @ flat
+        turned = own.transpose(0, 2, 1)
+        return turned @ own, turned @ right
 
     def solve(self) -> "Solution":
         """Return the values of least squares and their covariances. The chain stays as it is.

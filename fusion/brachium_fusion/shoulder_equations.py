@@ -100,28 +100,31 @@ def _movement(
 ) -> None:
     """Add what links neighbouring knots: speed and place, both sensors' accelerations and turns."""
     k, h, inc = len(stretch.missing), stretch.step_s, stretch.increments
-    eye, constants = np.eye(3), chain.constants.shape[0] - 1
-    begin, end = np.zeros((k, 18, SIZE)), np.zeros((k, 18, SIZE))
-    constant, value, sd = np.zeros((k, 18, constants)), np.zeros((k, 18)), np.empty((k, 18))
+    eye = np.eye(3)
+    begin, end = np.zeros((k, 6, SIZE)), np.zeros((k, 6, SIZE))
+    sd = np.full((k, 6), EXACT_M)
     begin[:, :3, PLACE], end[:, :3, PLACE] = -eye, eye
     begin[:, :3, SPEED] = end[:, :3, SPEED] = -0.5 * h * eye
-    sd[:, :3] = EXACT_M
-    for rows in (slice(3, 6), slice(6, 9), slice(9, 12)):
+    begin[:, 3:, SPEED], end[:, 3:, SPEED] = -eye, eye
+    sd[:, 3:] = sizes.shoulder_accel * (shift / sizes.shift) * sqrt(h)
+    sd[stretch.broken] = BROKEN
+    chain.add_between(begin, end, None, np.zeros((k, 6)), sd)
+    begin, end = np.zeros((k, 12, SIZE)), np.zeros((k, 12, SIZE))
+    constant, value = np.zeros((k, 12, len(chain.constants) - 1)), np.zeros((k, 12))
+    for rows in (slice(0, 3), slice(3, 6)):
         begin[:, rows, SPEED], end[:, rows, SPEED] = -eye, eye
-    sd[:, 3:6] = sizes.shoulder_accel * (shift / sizes.shift) * sqrt(h)
-    sd[stretch.broken, :6] = BROKEN
-    begin[:, 6:12, TURNS], end[:, 6:12, TURNS] = -inc.by_turn[:, :, :6], -inc.by_turn[:, :, 6:]
-    constant[:, 6:12, : si.CONSTANTS] = -inc.by_constant
-    constant[:, 9:12, TISSUE] = -stretch.tissue.velocity_by_tissue(model, world_upper, stretch.upper_rate, h)
-    value[:, 6:12] = inc.velocity
+    begin[:, :6, TURNS], end[:, :6, TURNS] = -inc.by_turn[:, :, :6], -inc.by_turn[:, :, 6:]
+    constant[:, :6, : si.CONSTANTS] = -inc.by_constant
+    constant[:, 3:6, TISSUE] = -stretch.tissue.velocity_by_tissue(model, world_upper, stretch.upper_rate, h)
+    value[:, :6] = inc.velocity
+    begin[:, 6:, TURNS], end[:, 6:, TURNS] = -np.eye(6), np.eye(6)
+    constant[:, 6:, : si.CONSTANTS] = -inc.turn_by_constant
     noise = sizes.accel_noise**2 + np.cumsum((sizes.lever * inc.swing) ** 2, axis=1)
-    sd[:, 6:12] = np.repeat(np.sqrt(noise * 0.1 * h), 3, axis=1)
-    begin[:, 12:, TURNS], end[:, 12:, TURNS] = -np.eye(6), np.eye(6)
-    constant[:, 12:, : si.CONSTANTS] = -inc.turn_by_constant
-    sd[:, 12:] = sizes.gyro_noise * sqrt(h)
-    sd[stretch.missing, 6:12] *= GONE
+    sd = np.full((k, 12), sizes.gyro_noise * sqrt(h))
+    sd[:, :6] = np.repeat(np.sqrt(noise * 0.1 * h), 3, axis=1)
+    sd[stretch.missing, :6] *= GONE
     for first, last in runs(stretch.missing):
-        sd[first:last, 12:] = MISSING_TURN * missing_share((last - first) * h) * h
+        sd[first:last, 6:] = MISSING_TURN * missing_share((last - first) * h) * h
     chain.add_between(begin, end, constant, value, sd)
 
 
@@ -135,10 +138,7 @@ def _places(chain: Chain, sizes: Sizes, stretch: Stretch, shift: float) -> None:
         variance[away < NEAR_REST_S] = (2.0 * sizes.shift) ** 2 * 60.0 / h
     own = np.zeros((k + 1, 3, SIZE))
     own[:, :, PLACE] = np.eye(3)
-    constant = np.zeros((k + 1, 3, chain.constants.shape[0] - 1))
-    chain.add_at(
-        np.arange(k + 1), own, constant, np.zeros((k + 1, 3)), np.sqrt(variance)[:, None] * np.ones(3)
-    )
+    chain.add_at(np.arange(k + 1), own, None, np.zeros((k + 1, 3)), np.sqrt(variance)[:, None] * np.ones(3))
 
 
 def _elbow(
@@ -168,10 +168,10 @@ def _rests(chain: Chain, sizes: Sizes, stretch: Stretch) -> None:
     knots = np.flatnonzero(stretch.at_rest)
     if not len(knots):
         return
-    own, constant = np.zeros((len(knots), 3, SIZE)), np.zeros((len(knots), 3, chain.constants.shape[0] - 1))
+    own = np.zeros((len(knots), 3, SIZE))
     own[:, :, SPEED] = np.eye(3)
     sd = np.full((len(knots), 3), sizes.rest_speed * sqrt(0.1 / stretch.step_s))
-    chain.add_at(knots, own, constant, np.zeros((len(knots), 3)), sd)
+    chain.add_at(knots, own, None, np.zeros((len(knots), 3)), sd)
 
 
 def _ties(chain: Chain, sizes: Sizes, ties: Ties) -> None:

@@ -1,9 +1,9 @@
 """What a sensor on the sternum says of the shoulder: where the trunk carries it. Pure.
 
 The trunk is taken as a rigid body that turns about the middle of the pelvis, which stays where it is: a
-person who sits or stands. The shoulder's displacement is then the trunk's part and the girdle's; the sensors on
-the arm show only their sum. The trunk's part is subtracted from what they measure, and the rest is estimated
-as on a back held still.
+person who sits or stands. The shoulder's displacement is then the trunk's part and the girdle's; the sensors
+on the arm show only their sum. The trunk's part is subtracted from what they measure, and the rest is
+estimated as on a back held still.
 """
 
 from dataclasses import dataclass

@@ -168,8 +168,7 @@ def _remember(chain: Chain, known: Known, world: Floats, constants: Floats, used
     """Add what was known before to the equations of the errors of `world` and `constants`."""
     turned = rotation.to_rotation_vector(rotation.multiply(known.world_from, rotation.inverse(world)))
     value = known.knot + np.concatenate([np.zeros(6), turned.ravel()])
-    none = np.zeros((1, SIZE, len(chain.constants) - 1))
-    chain.add_at(np.array([0]), np.eye(SIZE)[None], none, value[None], known.knot_sd[None])
+    chain.add_at(np.array([0]), np.eye(SIZE)[None], None, value[None], known.knot_sd[None])
     mean = np.concatenate([known.constants - constants * LINEARISED, *(p.place for p in used)])
     weight = np.concatenate([known.constants_sd, *(p.sd for p in used)]) ** -2.0
     index = np.arange(len(mean))
