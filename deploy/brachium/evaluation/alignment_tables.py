@@ -104,7 +104,9 @@ def _record(made: Emulated, segment: Segment) -> SensorRecord:
     """Return one sensor as a recording has it: its orientation found with the future known, no heading."""
     sensor = made.session.sensors[segment]
     found = smooth_orientation(sensor.gyr, sensor.acc, None, RATE_HZ)
-    return SensorRecord(world_from_sensor=found.world_from_sensor, nominal_mounting=sensor.nominal_mounting)
+    return SensorRecord(
+        world_from_sensor=found.world_from_sensor, nominal_mounting=sensor.nominal_mounting, acc=sensor.acc
+    )
 
 
 def _rows(made: Emulated) -> Sequence[Span]:
