@@ -145,8 +145,10 @@ def _finish(
     for i, time_ns in enumerate(times_ns.tolist()):
         now = {s: column[i] for s, column in readings.items()}
         if any(now.values()):
-            subject.reference_ns = time_ns  # headings are those of the whole recording: they do not age
-            instant = Instant(time_ns, now, time_ns, subject.alignment, subject.session, {})
+            subject.calibrating.reference_ns = (
+                time_ns  # headings are those of the whole recording: they do not age
+            )
+            instant = Instant(time_ns, now, time_ns, subject.calibrating.alignment, subject.session, {})
             for row in rows_of(SUBJECT, subject, instant):
                 moved: Shift | None = shifts[row.side][i] if row.side in shifts else None
                 rows.append(row._replace(shift=moved))
@@ -160,7 +162,7 @@ def _subject(material: Material, settings: Settings, alignment: Alignment | None
         subject.inform(segment, info)
     subject.session = material.session
     if alignment is not None:
-        subject.alignment = replace(alignment, heading=dict.fromkeys(alignment.heading, 0.0))
+        subject.calibrating.alignment = replace(alignment, heading=dict.fromkeys(alignment.heading, 0.0))
     return subject
 
 

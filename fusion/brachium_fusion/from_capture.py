@@ -8,9 +8,10 @@ import numpy.typing as npt
 
 from brachium_body.segments import Segment
 from brachium_fusion.best_material import Material, TimedSpan
+from brachium_fusion.motion_record import MotionRecord
 from brachium_fusion.pipeline import Pipeline
 from brachium_fusion.pose import POSES, Alignment
-from brachium_fusion.sensor_to_segment import SensorRecord, Span, align_segments
+from brachium_fusion.sensor_to_segment import Span, align_segments
 from brachium_fusion.session_terms import check_session
 from brachium_fusion.settings import Settings
 from brachium_fusion.subject import Subject
@@ -132,8 +133,8 @@ def solve(capture: Capture, settings: Settings, times_s: Floats) -> tuple[Pipeli
     pipeline = Pipeline(settings)
     subject = pipeline.subject(SUBJECT)
     _begin(subject, capture, nanoseconds(times_s).tolist())
-    subject.alignment = alignment
-    subject.reference_ns = int(nanoseconds(_start(capture)))
+    subject.calibrating.alignment = alignment
+    subject.calibrating.reference_ns = int(nanoseconds(_start(capture)))
     for segment, samples in batches(capture):
         pipeline.samples(SUBJECT, segment, samples)
     pipeline.finish()
@@ -204,29 +205,23 @@ def _alignment(capture: Capture, settings: Settings) -> Alignment | None:
     end_s = max(span.to_s for span in spans)
     wanted = times[times <= end_s + 1e-9]
     _begin(subject, capture, nanoseconds(wanted).tolist())
-    row_of = {time_ns: row for row, time_ns in enumerate(nanoseconds(wanted).tolist())}
-    quats: dict[str, Floats] = {name: np.full((len(wanted), 4), np.nan) for name in capture.segments}
+    record = MotionRecord()
     for fed, samples in batches(capture, end_s):
         subject.feed(fed, samples)
         for instant in subject.instants():
-            for name, reading in instant.readings.items():
-                if reading is not None:
-                    quats[name][row_of[instant.time_ns]] = reading.after
-    records = {
-        name: SensorRecord(
-            world_from_sensor=quats[name],
-            magnetometer=track.magnetometer or track.info.orientation_only,
-            nominal_mounting=None if track.info.mounting is None else np.array(track.info.mounting),
-        )
-        for name, track in subject.tracks.items()
-    }
+            record.take(instant.time_ns, instant.readings, subject.tracks)
+    if not record.times_ns:
+        return None
+    solved_s = 1e-9 * (np.array(record.times_ns) - ZERO_NS)
     rows = [
         Span(kind=span.kind, first=first, end=last, angles_deg=dict(span.angles_deg))  # type: ignore[arg-type]
         for span in spans
-        for first, last in [np.searchsorted(wanted, [span.from_s - 1e-9, span.to_s + 1e-9]).tolist()]
+        for first, last in [np.searchsorted(solved_s, [span.from_s - 1e-9, span.to_s + 1e-9]).tolist()]
         if first < last
     ]
     if not rows:
         return None
-    rate_hz = 1.0 / float(np.median(np.diff(wanted)))
-    return align_segments(records, rows, rate_hz, facing_deg=capture.settings.facing_deg)
+    rate_hz = 1e9 / float(np.median(np.diff(record.times_ns)))
+    return align_segments(
+        record.records(subject.tracks), rows, rate_hz, facing_deg=capture.settings.facing_deg
+    )

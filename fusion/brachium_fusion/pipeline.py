@@ -17,7 +17,9 @@ import msgpack
 import msgspec
 
 from brachium_fusion.arms import Arms
-from brachium_fusion.pose_watch import checked_wish
+from brachium_fusion.calibration_wish import checked_wish, checked_zero
+from brachium_fusion.guided import FitRequest
+from brachium_fusion.pose import Alignment
 from brachium_fusion.rows import Row, rows_of
 from brachium_fusion.session_terms import check_session
 from brachium_fusion.settings import Change, Settings
@@ -106,8 +108,12 @@ class Pipeline:
                 raise ValueError(f"session: {error}") from None
         elif change.kind == "calibrate":
             checked_wish(change.data)
+        elif change.kind == "zero":
+            checked_zero(change.data)
+        elif change.kind == "align":
+            _check_alignment(change.data)
         else:
-            raise ValueError(f"change {change.kind!r} is not known; changes are session and calibrate")
+            raise ValueError(f"change {change.kind!r} is not known; it is session, calibrate, zero or align")
         self.subject(subject_id).apply(change)
 
     def finish(self) -> None:
@@ -131,6 +137,14 @@ class Pipeline:
             subject = Subject(self.settings, lambda news: self.calibrations.append((subject_id, news)))
             self.subjects[subject_id] = subject
         return subject
+
+    def fits(self) -> list[tuple[str, FitRequest]]:
+        """Take away the alignments that wait to be found; what is found comes back as a change `align`."""
+        waiting = []
+        for subject_id, subject in self.subjects.items():
+            waiting += [(subject_id, request) for request in subject.calibrating.fits]
+            subject.calibrating.fits = []
+        return waiting
 
     def snapshot(self, subject_id: str) -> bytes:
         """Return a Snapshot message of one subject: settings and whole state after all that was fed.
@@ -160,3 +174,10 @@ class Pipeline:
     def _refuse(self, key: keys.Key, error: WireError) -> None:
         subject = self.subjects.get(key.subject)
         (self.drops if subject is None else subject.drops)[error.drop.value] += 1
+
+
+def _check_alignment(data: dict[str, Any]) -> None:
+    try:
+        Alignment.from_state(data["alignment"])
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        raise ValueError(f"align: no alignment: {error!r}") from None

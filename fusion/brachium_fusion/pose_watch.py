@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from brachium_fusion.pose import POSES, PoseName, pose_orientations
+from brachium_fusion.pose import PoseName
 from brachium_fusion.timeline import Reading
 
 Floats = npt.NDArray[np.float64]
@@ -92,20 +92,3 @@ class PoseWatch:
         watch = PoseWatch(PoseWish(**state["wish"]))
         watch._held = {s: [(t, np.array(q)) for t, q in rows] for s, rows in state["held"].items()}
         return watch
-
-
-def checked_wish(arguments: dict[str, Any]) -> dict[str, Any]:
-    """Return the arguments of `calibrate`, complete, or raise ValueError saying what may be asked."""
-    wish = {"pose": "n-pose", "seconds": STILL_S, "angles_deg": {}} | arguments
-    pose, seconds, angles = wish["pose"], wish["seconds"], wish["angles_deg"]
-    if len(wish) > 3:
-        unknown = sorted(set(wish) - {"pose", "seconds", "angles_deg"})[0]
-        raise ValueError(f"calibrate does not know {unknown!r}; it takes pose, seconds, angles_deg")
-    if pose not in POSES:
-        raise ValueError(f"calibrate: pose {pose!r} is not known; poses are {', '.join(POSES)}")
-    if not isinstance(seconds, int | float) or not 1.0 <= seconds <= 30.0:
-        raise ValueError(f"calibrate: seconds must be 1 to 30, not {seconds!r}")
-    if not isinstance(angles, dict) or not all(isinstance(v, int | float) for v in angles.values()):
-        raise ValueError("calibrate: angles_deg must be a map from an angle's name to degrees")
-    pose_orientations(pose, angles)
-    return {"pose": pose, "seconds": float(seconds), "angles_deg": angles}

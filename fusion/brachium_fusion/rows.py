@@ -59,7 +59,7 @@ def rows_of(subject_id: str, subject: Subject, instant: Instant) -> list[Row]:
         )
         uncertain = False
         if frame.drifts:
-            age_s = 1e-9 * (instant.time_ns - subject.reference_ns)
+            age_s = 1e-9 * (instant.time_ns - subject.calibrating.reference_ns)
             uncertain = HEADING_SD_DEG + HEADING_DRIFT_DEG_S * age_s > WITHHOLD_DEG
         rows.append(
             Row(

@@ -11,8 +11,9 @@ from typing import Any
 
 import msgspec
 
+from brachium_fusion.calibration_wish import checked_wish
 from brachium_fusion.pipeline import Pipeline
-from brachium_fusion.pose_watch import POSE_PATIENCE_S, STILL_S, checked_wish
+from brachium_fusion.pose_watch import POSE_PATIENCE_S, STILL_S
 from brachium_fusion.settings import Change, Settings
 from brachium_wire import keys
 from brachium_wire.bus import DEFAULT_ENDPOINT, Bus, Inbox

@@ -114,7 +114,7 @@ def _recording(settings: SolveSettings) -> Outcome:
     )
     times_ns = sorted({s.time_ns for s in skeletons})
     zero = times_ns[0] if times_ns else 0
-    alignment = pipeline.subject(name).alignment
+    alignment = pipeline.subject(name).calibrating.alignment
     nothing = ["no calibration pose was found: quality uncalibrated"]
     return Outcome(
         chosen=chosen,

@@ -16,9 +16,9 @@ import numpy.typing as npt
 from brachium_body.segments import SEGMENTS, Side
 from brachium_fusion.arm_knowledge import Centres
 from brachium_fusion.binding import Binding, Known
+from brachium_fusion.calibrating import Calibrating
 from brachium_fusion.plain_samples import plain_samples, samples_of
-from brachium_fusion.pose import Alignment, PoseName, PoseSensor, align, pose_orientations
-from brachium_fusion.pose_watch import HeldPose, PoseWatch, PoseWish
+from brachium_fusion.pose import Alignment
 from brachium_fusion.session_terms import lengths_of
 from brachium_fusion.settings import Change, Settings
 from brachium_fusion.timeline import Reading, Shift
@@ -57,7 +57,6 @@ class Subject:
 
     def __init__(self, settings: Settings, announce: Callable[[Calibration], None]) -> None:
         self._settings = settings
-        self._announce = announce
         self._period_ns = round(1e9 / settings.rate_hz)
         self._times: deque[int] | None = None
         self._next_ns: int | None = None
@@ -69,12 +68,9 @@ class Subject:
         self._done_ns = 0
         self._begun_ns = 0
         self._host: str | None = None
-        self._watch: PoseWatch | None = PoseWatch(PoseWish()) if settings.auto_pose else None
+        self.calibrating = Calibrating(settings.auto_pose, announce)
         self.tracks: dict[str, SegmentTrack] = {}
         self.received_ns = 0
-        self.alignment: Alignment | None = None
-        self.reference_ns = 0
-        """When headings were last set by a pose."""
         self.session = Session()
         self.drops: Counter[str] = Counter()
         self.revision = 0
@@ -105,38 +101,35 @@ class Subject:
         if track is not None:
             worn = info.origin == "worn"
             self._lose(segment, mounting=not worn or track.info.node != info.node)
-            if not worn and self.alignment is not None and not self.alignment.mounting:
+            if (
+                not worn
+                and self.calibrating.alignment is not None
+                and not self.calibrating.alignment.mounting
+            ):
                 self._begin_anew()
         self.tracks[segment] = SegmentTrack(info, self._settings.filter, self._settings.magnetometer)
-        if self._watch is not None:
-            self._watch.forget(segment)
+        self.calibrating.forget(segment)
         self.revision += 1
         for samples in self._unclaimed.pop(segment, ()):
             self.feed(segment, samples)
 
     def _lose(self, segment: str, *, mounting: bool) -> None:
         """Forget how a new sensor is mounted; doubt the heading of one whose filter began anew."""
-        track, known = self.tracks[segment], self.alignment
+        track, known = self.tracks[segment], self.calibrating.alignment
         if known is None or segment not in known.mounting:
             return
         if mounting:
             rest = {s: q for s, q in known.mounting.items() if s != segment}
-            self.alignment = replace(known, mounting=rest)
+            self.calibrating.alignment = replace(known, mounting=rest)
         elif not track.magnetometer and not track.info.orientation_only:
-            self.alignment = replace(known, assumed=known.assumed | {segment})
+            self.calibrating.alignment = replace(known, assumed=known.assumed | {segment})
         self.revision += 1
 
     def _begin_anew(self) -> None:
         """Nobody wears these sensors: another run of them is another wearer, who stands in a pose again."""
-        if self.alignment is None:
-            return
-        self.alignment = None
-        wish = PoseWish(from_ns=self.next_tick_ns())
-        self._watch = PoseWatch(wish) if self._settings.auto_pose else None
-        self.revision += 1
-        self._say(
-            self.next_tick_ns(), "waiting", reason="another run of these sensors: stand still in the pose"
-        )
+        if self.calibrating.alignment is not None:
+            self.calibrating.begin_anew(self.next_tick_ns())
+            self.revision += 1
 
     def _take_over(self, now_ns: int) -> None:
         """Let the second host in, once nothing came from the first for long."""
@@ -212,7 +205,8 @@ class Subject:
                 continue
             self._next_ns, self._done_ns = self._following(now), now
             self._apply_pending(now)
-            self._watch_pose(now, readings)
+            if self.calibrating.see(now, readings, self.tracks, self.session):
+                self.revision += 1
             shifts: dict[Side, Shift] = {}
             if self._settings.binds:
                 readings, shifts = self.binding.correct(now, readings, self._known(), self.revision)
@@ -220,7 +214,7 @@ class Subject:
                 now,
                 readings,
                 max(r.received_ns for r in readings.values() if r is not None),
-                self.alignment,
+                self.calibrating.alignment,
                 self.session,
                 shifts,
             )
@@ -280,7 +274,11 @@ class Subject:
 
     def _known(self) -> Known:
         return Known(
-            self.alignment, lengths_of(self.session), self.stated, self.tracks, self._settings.shoulder
+            self.calibrating.alignment,
+            lengths_of(self.session),
+            self.stated,
+            self.tracks,
+            self._settings.shoulder,
         )
 
     # -- changes and poses -------------------------------------------------------------------------------
@@ -291,65 +289,8 @@ class Subject:
             if change.kind == "session":
                 self.session = msgspec.convert(change.data, Session)
                 self.revision += 1
-            else:
-                self._watch = PoseWatch(PoseWish(from_ns=now, patient=False, **change.data))
-                self._say(now, "waiting", reason="stand still in the pose")
-
-    def _watch_pose(self, now: int, readings: dict[str, Reading | None]) -> None:
-        if self._watch is None:
-            return
-        live = {s: r for s, r in readings.items() if r is not None and r.quality in ("good", "disturbed")}
-        seen = self._watch.see(now, live, {s: self.tracks[s].still_since_ns for s in live})
-        if seen is None:
-            return
-        pose, self._watch = self._watch.wish.pose, None
-        if isinstance(seen, HeldPose):
-            self.take_alignment(now, seen.world_from_sensor, pose, seen.angles_deg)
-        else:
-            self._say(now, "refused", pose=pose, reason=seen)
-
-    def take_alignment(
-        self,
-        now: int,
-        world_from_sensor: dict[str, Floats],
-        pose: PoseName,
-        angles_deg: dict[str, float],
-        elbow_axis: dict[str, Floats] | None = None,
-    ) -> None:
-        """Align every segment from its orientations (k, 4) while the pose was held, from now on."""
-        sensors = {
-            segment: PoseSensor(
-                world_from_sensor=quats,
-                magnetometer=self.tracks[segment].magnetometer or self.tracks[segment].info.orientation_only,
-                nominal_mounting=_array(self.tracks[segment].info.mounting),
-            )
-            for segment, quats in world_from_sensor.items()
-        }
-        self.alignment = align(
-            sensors,
-            pose_orientations(pose, angles_deg),
-            facing_deg=self.session.facing_deg,
-            elbow_axis=elbow_axis,
-        )
-        self.reference_ns = now
-        self.revision += 1
-        self._say(now, "done", pose=pose)
-
-    def _say(self, now: int, state: str, pose: str = "", reason: str = "") -> None:
-        alignment = self.alignment or Alignment()  # what was known before still holds when a pose is refused
-        self._announce(
-            Calibration(
-                time_ns=now,
-                state=state,  # type: ignore[arg-type]
-                pose=pose,
-                progress=1.0 if state == "done" else 0.0,
-                reason=reason,
-                forward=alignment.forward,
-                mounting={s: _quaternion(q) for s, q in alignment.mounting.items()},
-                scores=alignment.scores,
-                warnings=list(alignment.warnings),
-            )
-        )
+            elif self.calibrating.change(now, change.kind, change.data):
+                self.revision += 1
 
     # -- snapshot ----------------------------------------------------------------------------------------
 
@@ -363,11 +304,9 @@ class Subject:
             "unclaimed": {s: [plain_samples(b) for b in row] for s, row in self._unclaimed.items()},
             "host": self._host,
             "pending": [[c.from_ns, c.kind, c.data] for c in self._pending],
-            "watch": None if self._watch is None else self._watch.state(),
+            "calibrating": self.calibrating.state(),
             "tracks": {s: [msgspec.to_builtins(t.info), t.state()] for s, t in self.tracks.items()},
             "received_ns": self.received_ns,
-            "alignment": None if self.alignment is None else self.alignment.state(),
-            "reference_ns": self.reference_ns,
             "session": msgspec.to_builtins(self.session),
             "binding": self.binding.state(self._known(), self.revision) if self._settings.binds else {},
         }
@@ -382,7 +321,7 @@ class Subject:
             for s, batches in state["unclaimed"].items()
         }
         self._pending = [Change(*c) for c in state["pending"]]
-        self._watch = None if state["watch"] is None else PoseWatch.from_state(state["watch"])
+        self.calibrating.restore(state["calibrating"])
         self.tracks = {}
         for segment, (info, track_state) in state["tracks"].items():
             track = SegmentTrack(
@@ -391,18 +330,7 @@ class Subject:
             track.restore(track_state)
             self.tracks[segment] = track
         self.received_ns = state["received_ns"]
-        self.alignment = None if state["alignment"] is None else Alignment.from_state(state["alignment"])
-        self.reference_ns = state["reference_ns"]
         self.session = msgspec.convert(state["session"], Session)
         self.revision += 1
         if self._settings.binds:
             self.binding.restore(state["binding"], self._known(), self.revision)
-
-
-def _array(values: Sequence[float] | None) -> Floats | None:
-    return None if values is None else np.array(values, dtype=np.float64)
-
-
-def _quaternion(q: Floats) -> tuple[float, float, float, float]:
-    w, x, y, z = q.tolist()
-    return (w, x, y, z)

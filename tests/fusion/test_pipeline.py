@@ -623,7 +623,7 @@ def test_a_pose_that_nobody_holds_is_refused_with_the_name_of_who_moved(made) ->
     last = pipeline.calibrations[-1][1]
     assert "forearm_r was not still" in last.reason
     assert last.time_ns - made.START == pytest.approx(33_000 * MS, abs=2 * TICK)
-    assert pipeline.subject("p01").alignment is None
+    assert pipeline.subject("p01").calibrating.alignment is None
 
 
 def test_a_session_holds_from_its_instant_on(made) -> None:

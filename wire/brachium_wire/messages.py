@@ -182,6 +182,8 @@ class Calibration(Message, frozen=True, kw_only=True, tag="calibration/1"):
     """How far it has come."""
     pose: str = ""
     """The pose that is held: `n-pose`, `table`, `given`."""
+    motion: str = ""
+    """What is to be done now: the pose, `elbow-flexion`, `pronation`, `free`; empty when nothing is."""
     progress: float = 0.0
     """0 to 1."""
     reason: str = ""
@@ -194,6 +196,8 @@ class Calibration(Message, frozen=True, kw_only=True, tag="calibration/1"):
     """How well it went, by name with unit."""
     warnings: list[str] = msgspec.field(default_factory=list)
     """What a person should know, one line each."""
+    refused: dict[str, str] = msgspec.field(default_factory=dict)
+    """What could not be found, by name, and the reason: one line that says what to do."""
 
 
 class Session(Message, frozen=True, kw_only=True, tag="session/1"):
