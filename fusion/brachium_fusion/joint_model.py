@@ -30,8 +30,8 @@ TILT_SD = radians(10.0)
 """At the beginning, maybe in full movement: 1 m/s^2 sideways is 6 deg."""
 GYRO_BIAS_SD = radians(0.5)
 """Left after calibration, or after switching on in another temperature."""
-ACC_BIAS_SD = 0.15
-"""m/s^2: 15 mg, zero-g offset of a consumer accelerometer after soldering and calibration at another time."""
+ACC_BIAS_SD = 0.05
+"""m/s^2: 5 mg, of a consumer accelerometer calibrated at another time and temperature."""
 LEVER_SD = 0.01
 """m: a measured lever arm; the chip lies a few mm from the middle of its case."""
 UNKNOWN_LEVER_SD = 0.15
@@ -124,7 +124,7 @@ class JointState:
     covariance: Floats
     """(30, 30)."""
     noise: Floats
-    """(1,) learnt factor of the variances of noise."""
+    """(2,) learnt factors of the variances of noise: of walks and agreement, of axes."""
     still_s: Floats
     """(2,) s for how long each sensor has been at rest."""
 
@@ -166,7 +166,7 @@ def begin(joint: Joint, attitude: Floats, gyr: Floats, heading_sd: float) -> Joi
     covariance = np.diag(deviation.ravel() ** 2)
     no_bias = np.zeros((2, 3))
     return JointState(
-        attitude.copy(), velocity, no_bias, no_bias.copy(), lever, covariance, np.ones(1), np.zeros(2)
+        attitude.copy(), velocity, no_bias, no_bias.copy(), lever, covariance, np.ones(2), np.zeros(2)
     )
 
 

@@ -57,12 +57,14 @@ def smooth_joint(
     world_from_a: Floats,
     world_from_b: Floats,
     shared_heading: bool = False,
+    start_sd_rad: float | None = None,
 ) -> JointTrajectory:
     """Return both sensors' orientations in one world.
 
     `a`, `b`: gyr (n, 3) rad/s and acc (n, 3) m/s^2 of each sensor on one grid of `rate_hz`; world_from_a and
     world_from_b (n, 4) by each sensor's own filter. Rows with NaN in any are missing. `shared_heading`: both
-    orientations come with a magnetometer's heading, which then is weak evidence.
+    orientations come with a magnetometer's heading, which then is weak evidence. `start_sd_rad`: both begin
+    in one world, for instance by a pose, to this standard deviation.
     """
     gyr, acc = np.stack([a[0], b[0]], axis=1), np.stack([a[1], b[1]], axis=1)
     given = np.stack([world_from_a, world_from_b], axis=1)
@@ -75,7 +77,7 @@ def smooth_joint(
     for first, end in edges.reshape(-1, 2).tolist():
         part = _Part(joint, rate_hz, gyr[first:end], acc[first:end], given[first:end], shared_heading)
         rows = slice(first, end)
-        found = part.solve(learnt)
+        found = part.solve(learnt, start_sd_rad if first == 0 else None)
         attitude[rows], heading[rows], sd[rows], residual[rows] = found
         learnt = part.last or learnt
     return JointTrajectory(attitude[:, 0], attitude[:, 1], heading, sd, residual)
@@ -115,10 +117,12 @@ class _Part:
         pieces = self.at[:-1, None] + np.arange(self.every + 1)
         self.intervals = Interval.gather(self.turns, gyr[pieces], acc[pieces], 1.0 / rate_hz)
 
-    def solve(self, learnt: JointState | None) -> tuple[Floats, Floats, Floats, Floats]:
+    def solve(
+        self, learnt: JointState | None, start_sd: float | None
+    ) -> tuple[Floats, Floats, Floats, Floats]:
         """Return attitudes (n, 2, 4), heading (n,), its standard deviation and residual (n,); `learnt` gives
-        biases and lever arms of a part before."""
-        start, sd = self._search()
+        biases and lever arms of a part before, `start_sd` says that both begin in one world."""
+        start, sd = self._search() if start_sd is None else (0.0, start_sd)
         if not (self.joint.has_axes or self.joint.has_levers):
             sd = SHARED_HEADING_SD if self.shared else pi
             n = len(self.gyr)

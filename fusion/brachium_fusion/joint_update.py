@@ -41,8 +41,8 @@ SHARED_HEADING_TIME_S = 60.0
 """It stays as wrong as it is while the arm stays where it is."""
 STILL_RATE = radians(2.0)
 """rad/s, mean over an interval: slower is rest, once it lasted."""
-STILL_S = 1.5
-STILL_SD = radians(0.3)
+STILL_S = 0.8
+STILL_SD = radians(0.15)
 """rad/s: an arm at rest sways."""
 STILL_TIME_S = 1.0
 NOISE_TIME_S = 20.0
@@ -116,12 +116,13 @@ def constrain(state: JointState, joint: Joint, gyr: Floats, shared: float | None
     agree = float(state.noise[0]) * (CENTRE_SD**2 + CENTRE_SD_PER_RATE**2 * squared)
     noise = np.repeat([agree, SPEED_SD**2 * SPEED_TIME_S / NODE_S], 3)
     residual = _correct(state, rows, np.concatenate([-apart, -centre.mean(axis=0)]), noise)
-    surprise = min(residual * residual, OUTLIER**2) - 1.0
-    state.noise = np.clip(state.noise * np.exp(surprise * NODE_S / NOISE_TIME_S), LEAST_NOISE, MOST_NOISE)
+    surprise = np.array([residual, 1.0])
     for i in np.flatnonzero(state.still_s > STILL_S).tolist():
         _hold_still(state, gyr, i)
     if joint.has_axes:
-        _hold_axes(state, joint)
+        surprise[1] = _hold_axes(state, joint)
+    learnt = np.exp((np.minimum(surprise**2, OUTLIER**2) - 1.0) * (NODE_S / NOISE_TIME_S))
+    state.noise = np.clip(state.noise * learnt, LEAST_NOISE, MOST_NOISE)
     if shared is not None:
         row = np.zeros((1, 2 * BLOCK))
         row[0, 2], row[0, BLOCK + 2] = -1.0, 1.0
@@ -139,22 +140,22 @@ def _hold_still(state: JointState, gyr: Floats, sensor: int) -> None:
     )
 
 
-def _hold_axes(state: JointState, joint: Joint) -> None:
+def _hold_axes(state: JointState, joint: Joint) -> float:
     """Two axes enclose a constant angle; of a hinge they are one."""
     assert joint.axis_a is not None
     assert joint.axis_b is not None
     a = rotation.rotate(state.attitude[0], joint.axis_a)
     b = rotation.rotate(state.attitude[1], joint.axis_b)
-    variance = AXIS_SD**2 * AXIS_TIME_S / NODE_S
+    variance = float(state.noise[1]) * AXIS_SD**2 * AXIS_TIME_S / NODE_S
     if joint.axes == 2:
         row = np.zeros((1, 2 * BLOCK))
         normal = np.cross(a, b)
         row[0, 0:3], row[0, BLOCK : BLOCK + 3] = normal, -normal
-        _correct(state, row, np.array([sin(joint.carrying_rad) - float(a @ b)]), np.array([variance]))
-        return
+        bend = np.array([sin(joint.carrying_rad) - float(a @ b)])
+        return _correct(state, row, bend, np.array([variance]))
     rows = np.zeros((3, 2 * BLOCK))
     rows[:, 0:3], rows[:, BLOCK : BLOCK + 3] = -skew(a), skew(b)
-    _correct(state, rows, b - a, np.full(3, variance))
+    return _correct(state, rows, b - a, np.full(3, variance))
 
 
 def _correct(state: JointState, rows: Floats, innovation: Floats, variance: Floats) -> float:
