@@ -97,6 +97,7 @@ class ShoulderFilter:
         """Begin to look ahead from what is held at the knot."""
         c = self._constants[: si.SITS.start].reshape(2, 4, 3)
         self._scale, self._bias = (1.0 - c[:, 2:]).reshape(12), c[:, :2].reshape(12)
+        self._sits = rotation.from_rotation_vector(self._constants[si.SITS].reshape(2, 3))
         self._now = fitted_model(self._model, self._constants)
         self._ahead.begin(
             self._world.ravel().tolist(),
@@ -156,13 +157,12 @@ class ShoulderFilter:
         hearing.elbow_and_place(errors, size, self._now, self._world, self._place, variance / h, h)
         if given is not None and self._heading_sd is not None:
             hearing.heading(errors, self._world, given, self._heading_sd, h)
-        self._take()
         if self._at_rest:
             sd = np.sqrt(np.diag(errors.covariance)[PLACE])
-            posture = watch.tie(self._world, self._place, sd)
+            posture = watch.tie(self._world, self._place + errors.mean[PLACE], sd)
             if posture is not None:
                 hearing.back(errors, size, posture, self._world, self._place)
-                self._take()
+        self._take()
 
     def _take(self) -> None:
         """Take the mean of the errors into what is held."""
@@ -171,7 +171,6 @@ class ShoulderFilter:
         turn = rotation.from_rotation_vector(x[TURNS].reshape(2, 3))
         self._world = rotation.normalize(rotation.multiply(turn, self._world))
         self._constants = self._constants + x[SIZE:]
-        self._now = fitted_model(self._model, self._constants)
 
     def _gap(self, missing_s: float, row: Floats, given: Floats | None) -> None:
         """Go over a time without samples: a short one as if they lay on a straight line to `row`."""
@@ -206,8 +205,7 @@ class ShoulderFilter:
     def _estimate(self, given: Floats | None) -> ShoulderEstimate:
         ahead, reason = self._ahead, self._watch.reason
         world = np.array(ahead.rows[-1][:8]).reshape(2, 4) if ahead.rows else self._world
-        sits = rotation.from_rotation_vector(self._constants[si.SITS].reshape(2, 3))
-        world = given if reason and given is not None else rotation.multiply(world, sits)
+        world = given if reason and given is not None else rotation.multiply(world, self._sits)
         since = self._period * max(len(ahead.rows) - 1, 0)
         go = np.concatenate([np.eye(3), since * np.eye(3)])
         spread = go.T @ self._errors.covariance[:6, :6] @ go
