@@ -129,11 +129,46 @@ def _bench() -> Proof:
     )
 
 
+ACCURACY: dict[str, tuple[str, ...]] = {
+    "recordings": ("broad", "two-segments", "people"),
+    "arm": ("arm", "loss"),
+    "long-run": ("long-run",),
+    "calibration": ("alignment", "contracture", "refusals", "wear-check", "sensor-sets"),
+    "tsilomitrou": ("tsilomitrou", "tsilomitrou-angles", "packet-loss", "calibration-left-out"),
+    "zhou": ("zhou", "zhou-errata", "zhou-lambda", "zhou-places", "detection"),
+}
+"""Tables of `evaluate`, by the proof that makes them; docs/accuracy.md shows them."""
+
+
+def _limits(figures: dict[str, Any]) -> list[dict[str, Any]]:
+    return [limit for table in figures["tables"].values() for limit in table["limits"]]
+
+
+def _accuracy(name: str, tables: tuple[str, ...]) -> Proof:
+    chosen = tuple(word for table in tables for word in ("--table", table))
+    return Proof(
+        name=f"accuracy-{name}",
+        commands=(("evaluate", "--data", "{data}", *chosen, "--json"),),
+        promises=(
+            Promise(
+                name="limits not met",
+                unit="1",
+                take=lambda f: sum(not x["met"] for x in _limits(f)),
+                at_most=0,
+            ),
+            Promise(name="limits", unit="1", take=lambda f: len(_limits(f))),
+            Promise(name="tables", unit="1", take=lambda f: len(f["tables"])),
+        ),
+        needs_data=name == "recordings",
+    )
+
+
 PROOFS: tuple[Proof, ...] = (
     _demo("typical", 3.5, 30.0),
     _demo("ideal", 1.5, 15.0),
     _repeat(),
     *(_broad(capture, "vqf", known) for capture, known in BROAD.items()),
     *(_broad(capture, "complementary", None) for capture in BROAD),
+    *(_accuracy(name, tables) for name, tables in ACCURACY.items()),
     _bench(),
 )

@@ -21,7 +21,7 @@ from brachium.shell import Failed, Usage, as_json
 if TYPE_CHECKING:
     from brachium.promises import Promise, Proof
 
-LONGEST_S = 600.0
+LONGEST_S = 1800.0
 
 
 @dataclass(frozen=True, kw_only=True)
