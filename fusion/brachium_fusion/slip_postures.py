@@ -72,6 +72,22 @@ def turned_since(ups: Floats) -> Turned | None:
     return best
 
 
+def evidence_of(ups: Floats, split: int, sensor: int, turn: Floats) -> float:
+    """Return what rests (m, k, 3) say of a turn (3,) of one sensor before rest `split`: below 0, against it.
+
+    Postures that are felt again just as before it contradict a turn that gravity would show.
+    """
+    if not 0 < split < len(ups):
+        return 0.0
+    turned = ups[split:].copy()
+    turned[:, sensor] = rotation.rotate(rotation.from_rotation_vector(turn), turned[:, sensor])
+    costs = []
+    for after in (ups[split:], turned):
+        angles = np.arccos(np.clip(np.einsum("isx,jsx->ijs", ups[:split], after), -1.0, 1.0))
+        costs.append(np.minimum(((angles / SAME) ** 2).sum(axis=2).min(axis=0), STRANGE).sum())
+    return float(costs[0] - costs[1])
+
+
 def _explained(before: Floats, after: Floats, others: Floats) -> tuple[Floats, Floats] | None:
     """Return the turn that best brings `after` (n, 3) onto `before` (m, 3), and each rest's misfit with it.
 
