@@ -4,9 +4,9 @@ Seen at rests: a sensor that feels gravity elsewhere in postures that are otherw
 (slip_postures.py). Seen while moving: rates that a joint of two known axes cannot have (slip_joints.py),
 unless postures felt just as before contradict. Not seen: a turn about the vertical of every posture in which
 the arm rests, or, by movement, about the joint's own axis in that sensor (a turn about the length of a
-forearm that rests only hanging is neither, without a sensor on the hand); the slip of the only sensor worn. A habit
-that changes by a few degrees in the last segment's joint alone looks like a slip of its sensor: there more
-rests are asked for.
+forearm that rests only hanging is neither, without a sensor on the hand); the slip of the only sensor worn. A
+habit that changes by a few degrees in the last segment's joint alone looks like a slip of its sensor: there
+more rests are asked for.
 """
 
 from bisect import bisect_left

@@ -2,9 +2,12 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
+from brachium_body import rotation
 from brachium_body.segments import Segment
+from brachium_fusion.joint_model import Joint
 from brachium_fusion.live_arm import SensorNow
 from brachium_fusion.strap_slip import Slip, SlipWatch
 from brachium_fusion.timeline import Motion
@@ -42,8 +45,25 @@ def _instants(session: SessionArrays) -> list[tuple[int, dict[str, SensorNow]]]:
     ]
 
 
+def _watch(session: SessionArrays) -> SlipWatch:
+    """Return a watch that knows the joints' axes from how the sensors sat in the pose."""
+    from_segment = {s: rotation.inverse(x.segment_from_sensor[0]) for s, x in session.sensors.items()}
+    x, y, z = np.eye(3)
+    joints = [
+        Joint(
+            axes=2,
+            axis_a=rotation.rotate(from_segment[upper], z),
+            axis_b=rotation.rotate(from_segment[lower], axis),
+            lever_a=None,
+            lever_b=None,
+        )
+        for upper, lower, axis in ((UPPER, FOREARM, y), (FOREARM, HAND, x))
+    ]
+    return SlipWatch((UPPER, FOREARM, HAND), RATE_HZ, joints)
+
+
 def _watched(session: SessionArrays) -> list[Slip]:
-    watch = SlipWatch((UPPER, FOREARM, HAND))
+    watch = _watch(session)
     slips = [watch.step(now, sensors) for now, sensors in _instants(session)]
     return [slip for slip in slips if slip is not None]
 
@@ -75,13 +95,23 @@ def test_straps_that_hold_are_left_in_peace(exercise: str) -> None:
     assert _watched(_session(exercise, None, "patient")) == []
 
 
+def test_movement_in_which_no_posture_comes_back_tells_by_the_joints() -> None:
+    """Without the joints nothing is said: each pause of free movement is another posture."""
+    session = _session("free", FOREARM)
+    (slip,) = _watched(session)
+    assert slip.segment == FOREARM
+    assert abs(slip.time_ns - SLIP_S * 1e9) <= 5e9
+    bare = SlipWatch((UPPER, FOREARM, HAND))
+    assert not any(bare.step(now, sensors) for now, sensors in _instants(session))
+
+
 def test_a_watch_goes_on_from_its_state() -> None:
     """Stopped anywhere and restored, it says the same at the same instant."""
-    instants = _instants(_session("reaching", FOREARM))
-    whole = SlipWatch((UPPER, FOREARM, HAND))
+    session = _session("reaching", FOREARM)
+    instants, whole = _instants(session), _watch(session)
     said = [whole.step(now, sensors) for now, sensors in instants]
     cut = len(instants) // 3
-    first, second = SlipWatch((UPPER, FOREARM, HAND)), SlipWatch((UPPER, FOREARM, HAND))
+    first, second = _watch(session), _watch(session)
     pieces = [first.step(now, sensors) for now, sensors in instants[:cut]]
     second.restore(first.state())
     pieces += [second.step(now, sensors) for now, sensors in instants[cut:]]
@@ -91,8 +121,9 @@ def test_a_watch_goes_on_from_its_state() -> None:
 
 def test_a_watch_that_forgets_compares_with_nothing_before() -> None:
     """After a new pose the sensor as it sits now is right."""
-    watch, said = SlipWatch((UPPER, FOREARM, HAND)), []
-    for now, sensors in _instants(_session("reaching", FOREARM)):
+    session = _session("reaching", FOREARM)
+    watch, said = _watch(session), []
+    for now, sensors in _instants(session):
         if now == SLIP_S * 1e9 + 1e9:
             watch.forget()
         said.append(watch.step(now, sensors))
