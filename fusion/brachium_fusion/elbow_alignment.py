@@ -32,6 +32,8 @@ UNSURE_DEG = 15.0
 """An axis or heading that is not known better is told as a warning."""
 NEAR_S = 120.0
 """The heading between sensors without magnetometers holds so long."""
+MORE_S = 30.0
+"""So much more movement than the refused spans hold stands in for them."""
 SHARED_SD = radians(20.0)
 """Of the headings of two magnetometers in a room with iron in it."""
 CENTRE_SD = radians(3.0)
@@ -91,7 +93,7 @@ def find_elbow(
     A functional span that holds another movement than its name says is refused and left out.
     """
     refused: dict[str, str] = {}
-    end = suffix(sensors.side)
+    end, all_spans = suffix(sensors.side), spans
     while True:
         fitted = fit_elbow(sensors, pose, spans, rate_hz)
         if isinstance(fitted, str):
@@ -100,28 +102,29 @@ def find_elbow(
         refused |= {f"{spans[place][0]}{end}": why for place, why in wrong.items()}
         spans = [span for place, span in enumerate(spans) if place not in wrong]
         if wrong and not any(kind in BENDING for kind, _, _ in spans):
-            return Refused(reasons=refused)
+            spans = _all_of_it(all_spans, sensors, rate_hz)
+            if not spans:
+                return Refused(reasons=refused)
+            continue
         if wrong:
             continue
         if degrees(fitted.found.axis_a_sd) > UNSURE_DEG and not any(kind == "free" for kind, _, _ in spans):
-            fitted = _wider(fitted, sensors, pose, spans, rate_hz)
+            # a still upper arm leaves open where its axis points: what came between may show it
+            wider = fit_elbow(sensors, pose, _all_of_it(spans, sensors, rate_hz, 0.0), rate_hz)
+            if not isinstance(wider, str) and wider.found.axis_a_sd < fitted.found.axis_a_sd:
+                fitted = wider
         return _result(fitted, sensors, pose, refused)
 
 
-def _wider(
-    fitted: FittedElbow, sensors: ElbowSensors, pose: ElbowPose, spans: Sequence[ElbowSpan], rate_hz: float
-) -> FittedElbow:
-    """Return the elbow from all that was recorded near the spans.
-
-    Led movements of a still upper arm leave open where its axis points; what came between may show it.
-    """
+def _all_of_it(
+    spans: Sequence[ElbowSpan], sensors: ElbowSensors, rate_hz: float, least_s: float = MORE_S
+) -> list[ElbowSpan]:
+    """Return one free span over all that was recorded near the spans, if it is `least_s` longer than they."""
     margin, last = round(NEAR_S * rate_hz), len(sensors.upper.world_from_sensor)
     first, end = min(s[1] for s in spans), max(s[2] for s in spans)
-    all_of_it = ("free", max(0, first - margin), min(last, end + margin))
-    wider = fit_elbow(sensors, pose, [all_of_it], rate_hz)
-    if isinstance(wider, str) or wider.found.axis_a_sd > fitted.found.axis_a_sd:
-        return fitted
-    return wider
+    whole: ElbowSpan = ("free", max(0, first - margin), min(last, end + margin))
+    more = (whole[2] - whole[1]) - sum(s[2] - s[1] for s in spans)
+    return [whole] if more >= least_s * rate_hz else []
 
 
 def fit_elbow(

@@ -25,7 +25,7 @@ PARALLEL_DEG = 35.0
 """A carrying angle beyond this is no elbow's."""
 SHARE = 0.5
 """Of a functional movement's turning that must be about its own axis."""
-ALONG = 0.28
+ALONG = 0.3
 """Of the forearm's rate: an upper arm that turns faster in a functional movement is moved by the shoulder."""
 ALONG_SD_DEG = 5.0
 """That does harm when the flexion axis is then not known better than this."""

@@ -223,6 +223,16 @@ def test_a_good_led_calibration_is_not_refused():
     assert "elbow_r" in found.joints
 
 
+@pytest.mark.parametrize("flexion", [8.0, 100.0])
+def test_what_else_was_recorded_stands_in_for_what_led_movements_do_not_show(flexion):
+    theta, chosen = led(flexion=flexion)
+    theta = np.concatenate([theta, movement(45.0, 2)])
+    records, true = worn(theta)
+    found = align_segments(records, chosen, RATE)
+    assert ("elbow-flexion_r" in found.refused) == (flexion < 20.0)
+    assert degrees_between(found.joints["elbow_r"].axis_near, axes_of(true)[0]) < 0.5
+
+
 def test_hardly_any_movement_leaves_the_pose_alone():
     theta = 0.05 * movement(MOVE_S, 1)
     records = {s: replace(r, nominal_mounting=rotation.IDENTITY) for s, r in worn(theta)[0].items()}
