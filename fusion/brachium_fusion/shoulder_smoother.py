@@ -127,7 +127,7 @@ def _begin(size: Sizes, lever_sd: float, held: list[Floats], orientations: Pair)
     one = np.repeat([size.gyro_bias, size.accel_bias, size.gyro_scale, size.accel_scale], 3)
     skin = np.full(POSTURES - si.CONSTANTS, size.tissue)
     sd = np.concatenate([one, one, np.full(6, size.mounting), np.full(9, max(lever_sd, LEAST_M)), skin])
-    return Known(np.array(world), np.zeros(SIZE), knot_sd, constants, sd, sd)
+    return Known(np.array(world), np.zeros(SIZE), knot_sd, constants, sd, constants, sd)
 
 
 def _doubtful(size: Sizes) -> Sizes:

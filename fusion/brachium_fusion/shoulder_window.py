@@ -1,6 +1,7 @@
 """One window of a recording's shoulder: nominal movement, equations of its errors, their solution. Pure."""
 
 from dataclasses import dataclass, replace
+from math import radians
 
 import numpy as np
 
@@ -30,8 +31,10 @@ LINEARISED = (np.arange(POSTURES) < si.LEVERS.start).astype(np.float64)
 CAREFUL = 1.5
 """Standard deviations are carried on larger by so much, for their correlations are not."""
 RIGID = 1e-4
-FORGET = 0.3
-"""Of what was not known at the start is unknown again a window later: biases walk, straps move."""
+WALKS = np.zeros(POSTURES)
+WALKS[[0, 1, 2, 12, 13, 14]] = radians(0.002)
+"""rad/s a sqrt(s): gyroscopes' biases go on from window to window. Everything else begins anew: a shoulder
+that moves with the arm looks a little like a longer lever arm, and what is small in a window must not add up."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -46,8 +49,9 @@ class Known:
     constants: Floats
     """(POSTURES,)."""
     constants_sd: Floats
+    first: Floats
     first_sd: Floats
-    """(POSTURES,) how they were known at the start of the recording."""
+    """(POSTURES,) the constants as they were known at the start of the recording."""
 
     def rigid(self) -> "Known":
         """Return the same of sensors that sit where the pose put them."""
@@ -204,7 +208,7 @@ def samples(window: Window, every: int, n: int) -> tuple[Floats, Floats, Floats,
 
 def carried(window: Window, known: Known, knot: int, every: int, postures: Postures) -> Known:
     """Return what a window makes of one of its knots, for the next to begin from; tell the postures."""
-    solution = window.solution
+    solution, elapsed_s = window.solution, knot * window.stretch.step_s
     x, covariance = solution.knots[knot], solution.covariance[knot]
     turn = rotation.from_rotation_vector(x[TURNS].reshape(2, 3))
     constants = window.constants * LINEARISED + solution.constants[:POSTURES]
@@ -212,12 +216,15 @@ def carried(window: Window, known: Known, knot: int, every: int, postures: Postu
     postures.learn(
         window.used, solution.constants[POSTURES:].reshape(-1, 3), spread[POSTURES:].reshape(-1, 3)
     )
-    sd = np.minimum(np.hypot(spread[:POSTURES], FORGET * known.first_sd), known.first_sd)
+    walks = WALKS > 0.0
+    constants = np.where(walks, constants, known.first)
+    sd = np.where(walks, np.hypot(spread[:POSTURES], np.sqrt(elapsed_s) * WALKS), known.first_sd)
     return Known(
         rotation.multiply(turn, window.sensors[:, knot * every]),
         np.concatenate([x[:6], np.zeros(6)]),
         CAREFUL * np.sqrt(np.diag(covariance)),
         constants,
         sd,
+        known.first,
         known.first_sd,
     )
