@@ -133,7 +133,7 @@ ACCURACY: dict[str, tuple[str, ...]] = {
     "recordings": ("broad", "two-segments", "people"),
     "arm": ("arm", "loss"),
     "long-run": ("long-run",),
-    "calibration": ("alignment", "contracture", "refusals", "wear-check", "sensor-sets"),
+    "calibration": ("alignment", "contracture", "refusals", "wear-check", "slip", "sensor-sets"),
     "tsilomitrou": ("tsilomitrou", "tsilomitrou-angles", "packet-loss", "calibration-left-out"),
     "zhou": ("zhou", "zhou-errata", "zhou-lambda", "zhou-places", "detection"),
 }
