@@ -47,7 +47,6 @@ CATALOGUE: tuple[Entry, ...] = (
     Entry(name="refusals", shows="calibration movements that cannot be used", make=alignment_tables.refusals),
     Entry(name="wear-check", shows="200 wearers: right, swapped, turned, arms exchanged",
           make=wear_tables.wear),
-    Entry(name="slips", shows="a strap that slips by 8 deg, and straps that hold", make=slip_tables.slips),
     Entry(name="slip", shows="a strap that slips by 8 deg", make=slip_tables.slip),
     Entry(name="tsilomitrou", shows="Tables 4 and 5 of Tsilomitrou et al. 2021",
           make=tsilomitrou_tables.places),
