@@ -25,7 +25,9 @@ from brachium_fusion.shoulder_model import (
 from brachium_fusion.shoulder_postures import Postures
 from brachium_fusion.shoulder_window import Known, carried, samples, solve
 
-WINDOW_S, OVERLAP_S = 60.0, 6.0
+WINDOW_S, OVERLAP_S = 30.0, 4.0
+"""Not longer: what the model leaves out comes again with each repetition, and does not average out of how the
+sensors seem to sit."""
 IMPLAUSIBLE = 3.0
 """No sensor sits farther, in standard deviations, from where the pose put it."""
 LEAST_M = 1e-4
