@@ -11,6 +11,7 @@ COMMANDS: dict[str, str] = {
     "emulate": "an emulated wearer, through the gateway or straight to the bus",
     "play": "a capture folder or a recording, as if it were being measured now",
     "fuse": "fusion: samples to skeletons",
+    "calibrate": "calibrate a person's sensors in a running network: it says what to do",
     "view": "the live view",
     "record": "the recorder",
     "monitor": "the network in the terminal: nodes, rates, loss, latency",
@@ -44,7 +45,7 @@ def main(argv: list[str] | None = None) -> int:
 
 
 def _help() -> str:
-    rows = "\n".join(f"  {name:<9}{text}" for name, text in COMMANDS.items())
+    rows = "\n".join(f"  {name:<10}{text}" for name, text in COMMANDS.items())
     return (
         "usage: brachium COMMAND [options]\n\n"
         "Upper-limb motion tracking with small wireless inertial sensors.\n\n"

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from brachium_fusion.guided import WORDS, FitRequest, Guided, GuidedWish, Told
+from brachium_fusion.guided import FITTING, WORDS, FitRequest, Guided, GuidedWish, Told
 from brachium_fusion.pose import Alignment, PoseSensor, align, pose_orientations
 from brachium_fusion.pose_watch import STILL_S, HeldPose, PoseWatch, PoseWish
 from brachium_fusion.timeline import Reading
@@ -16,9 +16,6 @@ from brachium_fusion.zero import zeroed
 from brachium_wire.messages import Calibration, Quaternion, Session
 
 Floats = npt.NDArray[np.float64]
-
-FITTING = 0.95
-"""Progress while the alignment is worked out."""
 
 
 class Calibrating:

@@ -32,20 +32,24 @@ RECORD_NS = 40_000_000
 ENOUGH_RAD: dict[Motion, float] = {
     "elbow-flexion": radians(500.0),
     "pronation": radians(400.0),
-    "free": radians(2000.0),
+    "free": radians(900.0),
 }
 """The forearm's turning, all added up, that makes a movement: five times there and back, not quite."""
 REST_NS = 800_000_000
 """Of stillness ends a movement of which enough was seen."""
+FREE_S, ONLY_FREE_S = 10.0, 30.0
+"""Free movement takes so long; longer where no other movement is asked for."""
 LONGEST_NS: dict[Motion, int] = {
     "elbow-flexion": 30_000_000_000,
     "pronation": 30_000_000_000,
-    "free": 40_000_000_000,
+    "free": 60_000_000_000,
 }
+PLENTY = 2.0
+"""So many times what is enough ends a movement even of one who does not hold still."""
 LEAST = 0.3
 """Less than this part of what is wanted is no movement: refused."""
-POSE_SHARE = 0.2
-"""Of the progress, the pose."""
+POSE_SHARE, FITTING = 0.2, 0.95
+"""Progress after the pose, and while the alignment is worked out."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -175,9 +179,13 @@ class Guided:
         rates = [m.gyr for s in live if s.startswith("forearm") and (m := tracks[s].timeline.motion_at(now))]
         step.turned += since_s * max((float(np.linalg.norm(rate)) for rate in rates), default=0.0)
         seen = min(1.0, step.turned / ENOUGH_RAD[motion])
+        if motion == "free":
+            wanted_s = ONLY_FREE_S if len(self.wish.motions) == 1 else FREE_S
+            seen = min(seen, 1e-9 * (now - step.begun_ns) / wanted_s)
         still = all(now - tracks[s].still_since_ns >= REST_NS for s in live)
         late = now - step.begun_ns >= LONGEST_NS[motion]
-        if (seen >= 1.0 and (still or motion == "free")) or (late and seen >= LEAST):
+        plenty = step.turned >= PLENTY * ENOUGH_RAD[motion]
+        if (seen >= 1.0 and (still or plenty or motion == "free")) or (late and seen >= LEAST):
             end = len(self._record.times_ns)
             self._spans.append(Span(kind=motion, first=step.first, end=end))
             return self._next(now)
@@ -191,8 +199,8 @@ class Guided:
         step = self._step
         step.told = seen
         motion = self.wish.motions[step.index]
-        share = (1.0 - POSE_SHARE) / len(self.wish.motions)
-        return Told(motion, POSE_SHARE + share * (step.index + 0.99 * seen), WORDS[motion])
+        share = (FITTING - POSE_SHARE) / len(self.wish.motions)
+        return Told(motion, POSE_SHARE + share * (step.index + seen), WORDS[motion])
 
     def complete(
         self, request: FitRequest, tracks: Mapping[str, SegmentTrack], facing_deg: float | None

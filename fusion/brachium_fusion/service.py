@@ -5,21 +5,23 @@ import logging
 import threading
 import time
 from collections import Counter
-from collections.abc import Callable
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 import msgspec
 
-from brachium_fusion.calibration_wish import checked_wish
+from brachium_fusion.calibration_desk import CalibrationDesk, Reply
+from brachium_fusion.calibration_wish import checked_wish, checked_zero
+from brachium_fusion.kept import Kept
 from brachium_fusion.pipeline import Pipeline
-from brachium_fusion.pose_watch import POSE_PATIENCE_S, STILL_S
+from brachium_fusion.pose_watch import STILL_S
 from brachium_fusion.settings import Change, Settings
 from brachium_wire import keys
 from brachium_wire.bus import DEFAULT_ENDPOINT, Bus, Inbox
 from brachium_wire.codec import Drop, WireError, decode, decode_topic, encode
 from brachium_wire.heart import Heart
-from brachium_wire.messages import Answer, Calibration, Command, Event
+from brachium_wire.messages import Answer, Command, Event
 
 log = logging.getLogger(__name__)
 
@@ -35,8 +37,6 @@ GC_ALLOCATIONS = 20_000
 PUT_AT_ONCE, PUT_PAUSE_S = 100, 0.001
 """After a hold-up a thousand skeletons are due at once: pauses let the send queue take them all."""
 
-Reply = Callable[[bytes], None]
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FuseSettings:
@@ -46,6 +46,8 @@ class FuseSettings:
     room: str = keys.DEFAULT_ROOM
     service_id: str = "fusion"
     pipeline: Settings = field(default_factory=Settings)
+    keep: Path | None = None
+    """Folder in which calibrations are kept; None keeps none."""
 
 
 def run(settings: FuseSettings, stop: threading.Event) -> None:
@@ -74,8 +76,9 @@ class FusionService:
         self._told: set[str] = set()
         self._asked: list[tuple[keys.Key, bytes, Reply]] = []
         self._lock = threading.Lock()
-        self._waiting: dict[str, list[tuple[float, Reply]]] = {}
-        for verb in ("calibrate", "record"):
+        kept = None if settings.keep is None else Kept(settings.keep)
+        self._desk = CalibrationDesk(self._pipeline, settings.room, kept)
+        for verb in ("calibrate", "zero", "record"):
             bus.serve_later(keys.commands(settings.room, verb), self._on_command)
         self._heard(bus.fetch(keys.subjects(settings.room, "imu/*/info")))
         for subject in sorted(self._pipeline.subjects):
@@ -97,21 +100,20 @@ class FusionService:
         for key, payload in self._sessions.drain():
             self._heard_session(key, payload)
         self._heard(self._inbox.drain())
+        for subject, found in self._desk.changes():
+            self._apply(subject, "align", found)
         self._publish()
         self._tell_settings()
         with self._lock:
             asked, self._asked = self._asked, []
         for parsed, question, reply in asked:
             self._answer(parsed, question, reply)
-        self._give_up()
+        self._desk.give_up()
         self._beat()
 
     def close(self) -> None:
         """Tell the last health and who still waits for an answer."""
-        for replies in self._waiting.values():
-            for _, reply in replies:
-                reply(encode(Answer(ok=False, reason="fusion is stopping")))
-        self._waiting.clear()
+        self._desk.close()
         self._beat(now=True)
         self._heart.end()
 
@@ -163,7 +165,7 @@ class FusionService:
             for warning in calibration.warnings:
                 log.warning("%s: %s", subject, warning)
             if calibration.state in ("done", "refused"):
-                self._finish_calibration(subject, calibration)
+                self._desk.finished(subject, calibration)
 
     # -- commands ----------------------------------------------------------------------------------------
 
@@ -186,16 +188,12 @@ class FusionService:
                 snapshot = self._pipeline.snapshot(key.subject)
                 reply(encode(Answer(ok=True, data={"snapshot": snapshot})))
             else:
-                self._begin_calibration(key.subject, command, reply)
+                check = checked_wish if key.detail == "calibrate" else checked_zero
+                wish = check(command.arguments)
+                self._desk.wait(key.subject, wish, reply)
+                self._apply(key.subject, key.detail, wish)
         except (WireError, ValueError, TypeError) as error:
             reply(encode(Answer(ok=False, reason=str(error))))
-
-    def _begin_calibration(self, subject: str, command: Command, reply: Reply) -> None:
-        wish = checked_wish(command.arguments)
-        self._waiting.setdefault(subject, []).append(
-            (time.monotonic() + wish["seconds"] + POSE_PATIENCE_S + 5, reply)
-        )
-        self._apply(subject, "calibrate", wish)
 
     def _apply(self, subject: str, kind: str, data: dict[str, Any]) -> None:
         """Apply a change from the next tick on, and say so on the bus: a recording repeats it at that
@@ -204,28 +202,6 @@ class FusionService:
         self._pipeline.apply(subject, change)
         event = Event(time_ns=change.from_ns, kind="applied", text=kind, data=data)
         self._bus.put(keys.event(self._room, subject), encode(event))
-
-    def _finish_calibration(self, subject: str, calibration: Calibration) -> None:
-        answer = Answer(
-            ok=calibration.state == "done",
-            reason=calibration.reason,
-            data={
-                "forward": calibration.forward,
-                "scores": calibration.scores,
-                "warnings": calibration.warnings,
-            },
-        )
-        for _, reply in self._waiting.pop(subject, ()):
-            reply(encode(answer))
-
-    def _give_up(self) -> None:
-        now = time.monotonic()
-        for subject, replies in list(self._waiting.items()):
-            for entry in [r for r in replies if r[0] < now]:
-                replies.remove(entry)
-                entry[1](encode(Answer(ok=False, reason="no samples arrive: nothing to calibrate from")))
-            if not replies:
-                del self._waiting[subject]
 
     def _beat(self, *, now: bool = False) -> None:
         heart = self._heart

@@ -1,0 +1,124 @@
+"""Calibrate a person's sensors in a running network: it says what to do, and how it went.
+
+brachium calibrate --subject p01 --routine guided
+"""
+
+import argparse
+import threading
+from typing import TYPE_CHECKING, Any
+
+from brachium.option_types import real
+from brachium.shell import Failed, Usage, add_json, add_network, print_json, stop_on_signals
+
+if TYPE_CHECKING:
+    from brachium_wire.bus import Bus, Inbox
+    from brachium_wire.messages import Answer, Calibration
+
+LONGEST_S = 300.0
+"""No calibration takes longer; fusion itself gives up earlier."""
+
+
+def configure(parser: argparse.ArgumentParser) -> None:
+    """Add the options of calibrations."""
+    add_network(parser)
+    add_json(parser)
+    parser.add_argument("--subject", default="p01", help="who wears the sensors")
+    parser.add_argument(
+        "--routine",
+        choices=("pose", "guided", "free"),
+        default="guided",
+        help="pose: stand still; guided: also bend the elbow, turn the palm, move freely; free: pose, then "
+        "any movement",
+    )
+    parser.add_argument(
+        "--pose", choices=("n-pose", "table", "given"), default="n-pose", help="to begin with"
+    )
+    parser.add_argument(
+        "--angle",
+        action="append",
+        default=[],
+        type=_angle,
+        metavar="NAME=DEG",
+        help="an angle held in the pose `given`, as in elbow_flexion=35",
+    )
+    parser.add_argument(
+        "--seconds", type=real(1.0, 30.0), default=3.0, metavar="S", help="how long the pose is held"
+    )
+    parser.add_argument("--zero", action="store_true", help="only set headings anew: let the arms hang still")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Ask fusion, and tell what it says."""
+    from brachium_wire import keys
+    from brachium_wire.bus import Bus
+
+    angles = dict(args.angle)
+    if angles and args.pose != "given":
+        raise Usage("--angle belongs to --pose given")
+    stop = stop_on_signals()
+    with Bus.open(args.endpoint, stop=stop) as bus:
+        news = bus.subscribe(keys.calibration(args.room, args.subject))
+        verb = "zero" if args.zero else "calibrate"
+        arguments: dict[str, Any] = {"seconds": min(args.seconds, 2.0) if args.zero else args.seconds}
+        if not args.zero:
+            arguments |= {"pose": args.pose, "routine": args.routine, "angles_deg": angles}
+        answer = _asked(bus, keys.command(args.room, args.subject, verb), arguments, news, stop, args.json)
+    if answer is None:
+        if stop.is_set():
+            return 1
+        raise Failed("fusion does not answer; is `brachium fuse` running in this room?")
+    if args.json:
+        print_json({"ok": answer.ok, "reason": answer.reason, **answer.data})
+    elif answer.ok:
+        print(_words(answer.data))
+    if not answer.ok:
+        raise Failed(answer.reason)
+    return 0
+
+
+def _asked(
+    bus: "Bus", key: str, arguments: dict[str, Any], news: "Inbox", stop: threading.Event, quiet: bool
+) -> "Answer | None":
+    """Ask, and show progress until the answer comes."""
+    from brachium_wire.codec import decode, encode
+    from brachium_wire.messages import Answer, Calibration, Command
+
+    answered = threading.Event()
+    found: list[bytes | None] = []
+
+    def ask() -> None:
+        found.append(bus.ask(key, encode(Command(arguments=arguments)), timeout_s=LONGEST_S))
+        answered.set()
+
+    threading.Thread(target=ask, daemon=True).start()
+    said = ""
+    while not answered.is_set() and not stop.is_set():
+        for _, payload in news.drain():
+            told = _line(decode(payload, Calibration))
+            if told != said and told and not quiet:
+                print(told, flush=True)
+            said = told
+        news.wait(0.1)
+    return decode(found[0], Answer) if found and found[0] is not None else None
+
+
+def _line(news: "Calibration") -> str:
+    """Return what to do now; empty once it is over."""
+    if news.state not in ("waiting", "running"):
+        return ""
+    return f"{round(100 * news.progress):3d} %  {news.reason}"
+
+
+def _words(data: dict[str, Any]) -> str:
+    lines = [f"calibrated; forward: {data.get('forward', 'none')}"]
+    lines += [f"  {name.replace('_', ' ')}: {value:.1f}" for name, value in data.get("scores", {}).items()]
+    lines += [f"not found, {what.replace('_', ' ')}: {why}" for what, why in data.get("refused", {}).items()]
+    lines += [f"warning: {warning}" for warning in data.get("warnings", [])]
+    return "\n".join(lines)
+
+
+def _angle(text: str) -> tuple[str, float]:
+    name, equals, value = text.partition("=")
+    if not equals or not name:
+        raise argparse.ArgumentTypeError(f"{text!r} cannot be used: write NAME=DEG, as in elbow_flexion=35")
+    return name, real(-360.0, 360.0)(value)
