@@ -34,7 +34,7 @@ RIGID = 1e-4
 WALKS = np.zeros(POSTURES)
 WALKS[[0, 1, 2, 12, 13, 14]] = radians(0.002)
 """rad/s a sqrt(s): gyroscopes' biases go on from window to window. Everything else begins anew: a shoulder
-that moves with the arm looks a little like a longer lever arm, and what is small in a window must not add up."""
+that moves with the arm looks a little like a longer lever arm; what is small in a window must not add up."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
