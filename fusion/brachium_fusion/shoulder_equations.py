@@ -77,11 +77,11 @@ def missing_share(gap_s: float) -> float:
 
 
 def equations(
-    model: ArmModel, sizes: Sizes, stretch: Stretch, postures: int, ties: Ties, shift: float
+    model: ArmModel, sizes: Sizes, stretch: Stretch, postures: int, ties: Ties, shift: Floats
 ) -> Chain:
     """Return the equations without what was known before: movement, sensors, elbow, rests and ties.
 
-    `shift` m is the standard deviation of the shoulder's displacement.
+    `shift` (k + 1,) m is the standard deviation of the shoulder's displacement, at each knot.
     """
     k = len(stretch.missing)
     chain = Chain.empty(k, SIZE, POSTURES + 3 * postures)
@@ -96,7 +96,7 @@ def equations(
 
 
 def _movement(
-    chain: Chain, sizes: Sizes, stretch: Stretch, world_upper: Floats, model: ArmModel, shift: float
+    chain: Chain, sizes: Sizes, stretch: Stretch, world_upper: Floats, model: ArmModel, shift: Floats
 ) -> None:
     """Add what links neighbouring knots: speed and place, both sensors' accelerations and turns."""
     k, h, inc = len(stretch.missing), stretch.step_s, stretch.increments
@@ -106,7 +106,7 @@ def _movement(
     begin[:, :3, PLACE], end[:, :3, PLACE] = -eye, eye
     begin[:, :3, SPEED] = end[:, :3, SPEED] = -0.5 * h * eye
     begin[:, 3:, SPEED], end[:, 3:, SPEED] = -eye, eye
-    sd[:, 3:] = sizes.shoulder_accel * (shift / sizes.shift) * sqrt(h)
+    sd[:, 3:] = (sizes.shoulder_accel * sqrt(h) / sizes.shift * shift[:-1])[:, None]
     sd[stretch.broken] = BROKEN
     chain.add_between(begin, end, None, np.zeros((k, 6)), sd)
     begin, end = np.zeros((k, 12, SIZE)), np.zeros((k, 12, SIZE))
@@ -128,14 +128,14 @@ def _movement(
     chain.add_between(begin, end, constant, value, sd)
 
 
-def _places(chain: Chain, sizes: Sizes, stretch: Stretch, shift: float) -> None:
+def _places(chain: Chain, sizes: Sizes, stretch: Stretch, shift: Floats) -> None:
     """Add at each knot that the shoulder is not far from its place: little near a rest of a shoulder that
     moves, for it may rest anywhere, and enough to forget what integration does between rests."""
     k, h = len(stretch.missing), stretch.step_s
-    variance = np.full(k + 1, shift**2 * sizes.shift_s / h)
-    if stretch.at_rest.any() and shift > 0.5 * sizes.shift:
+    variance: Floats = shift**2 * sizes.shift_s / h
+    if stretch.at_rest.any():
         away: Floats = h * np.asarray(distance_transform_edt(~stretch.at_rest))
-        variance[away < NEAR_REST_S] = (2.0 * sizes.shift) ** 2 * 60.0 / h
+        variance[(shift > 0.5 * sizes.shift) & (away < NEAR_REST_S)] = (2.0 * sizes.shift) ** 2 * 60.0 / h
     own = np.zeros((k + 1, 3, SIZE))
     own[:, :, PLACE] = np.eye(3)
     chain.add_at(np.arange(k + 1), own, None, np.zeros((k + 1, 3)), np.sqrt(variance)[:, None] * np.ones(3))

@@ -4,6 +4,7 @@ from dataclasses import dataclass, replace
 from math import radians
 
 import numpy as np
+from scipy.ndimage import uniform_filter1d
 
 from brachium_body import rotation
 from brachium_fusion import shoulder_increments as si
@@ -28,6 +29,8 @@ PASSES = 3
 """Of linearisation; the second knows how much the shoulder moves, and its rests."""
 LINEARISED = (np.arange(POSTURES) < si.LEVERS.start).astype(np.float64)
 """The constants that the nominal movement is corrected by; lever arms and skin stay linear."""
+ABOUT_S = 10.0
+"""Before and after an instant: whether the shoulder is being moved or held still."""
 CAREFUL = 1.5
 """Standard deviations are carried on larger by so much, for their correlations are not."""
 RIGID = 1e-4
@@ -96,7 +99,8 @@ def solve(
     every, period = si.stride(rate_hz), 1.0 / rate_hz
     step_s = every * period
     filled, missing = _filled(data, every)
-    world, constants, shift = known.world_from, known.constants * LINEARISED, size.shift
+    world, constants = known.world_from, known.constants * LINEARISED
+    shift = np.full(len(missing) + 1, size.shift)
     place: Floats | None = None
     speed: Floats | None = None
     walks = np.zeros(len(missing), dtype=bool)
@@ -127,12 +131,21 @@ def solve(
         turn = solution.knots[0, TURNS].reshape(2, 3)
         world = rotation.multiply(rotation.from_rotation_vector(turn), world)
         place, speed = solution.knots[:, PLACE], solution.knots[:, SPEED]
-        shift = (
-            float(np.clip(np.sqrt(np.mean(place[~_beside(walks)] ** 2)), size.still, size.shift))
-            if not walks.all()
-            else size.shift
-        )
+        shift = _goes(place, _beside(walks), step_s, size)
     raise AssertionError("there is at least one pass")
+
+
+def _goes(place: Floats, walks: Bools, step_s: float, size: Sizes) -> Floats:
+    """Return how far the shoulder goes about each knot (k + 1,) m: the 3-D RMS of `place` (k + 1, 3) within
+    ABOUT_S, for it may be held still for a minute and then be lifted. Walking does not count."""
+    width = 2 * round(ABOUT_S / step_s) + 1
+    square, counts = (
+        uniform_filter1d(values, width, mode="constant")
+        for values in (np.where(walks, 0.0, np.sum(place**2, axis=1)), np.where(walks, 0.0, 1.0))
+    )
+    known: Bools = counts > 0.5 / width
+    goes = np.sqrt(np.where(known, square / np.maximum(counts, 0.5 / width), size.shift**2))
+    return np.asarray(np.clip(goes, size.still, size.shift))
 
 
 def _filled(data: list[Floats], every: int) -> tuple[list[Floats], Bools]:
