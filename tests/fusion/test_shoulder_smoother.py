@@ -143,6 +143,16 @@ def test_rests_help_where_the_shoulder_moves():
     assert (speed[found.at_rest] < 0.03).mean() > 0.97
 
 
+def test_a_shoulder_is_lifted_after_a_minute_of_stillness():
+    made, segments = session("shrugging", "ideal", to_s=72.0, routine="calibration")
+    found = smoothed(made, segments)
+    lifted = round(50.0 * RATE)
+    true = true_shift(made)
+    assert rms(true[lifted:]) > 0.03
+    assert rms((found.shift_m - true)[lifted:]) < 0.005
+    assert rms((found.shift_m - true)[:lifted]) < 0.004
+
+
 def test_a_left_arm_is_the_mirror_of_a_right_one():
     mirror = np.array([-1.0, 1.0, 1.0])
     made, segments = session("shrugging", "exact")
