@@ -1,3 +1,4 @@
+import os
 import socket
 import threading
 import time
@@ -5,6 +6,7 @@ from collections.abc import Callable, Iterator
 
 import pytest
 
+from brachium_nodes.firmware_host import Build, NoMicroPython, build
 from brachium_nodes.gateway import GatewaySettings, run
 from brachium_nodes.roster import NodeEntry
 from brachium_wire import keys
@@ -133,3 +135,14 @@ def gateway(endpoint: str, bus: Bus) -> Iterator[Callable[..., Running]]:
     yield start
     for one in running:
         one.end()
+
+
+@pytest.fixture(scope="session")
+def firmware(tmp_path_factory: pytest.TempPathFactory) -> Build:
+    """The files that are flashed; where everything must run, a missing interpreter is a failure."""
+    try:
+        return build(tmp_path_factory.mktemp("firmware"))
+    except NoMicroPython as error:
+        if os.environ.get("CI") == "true":
+            pytest.fail(str(error))
+        pytest.skip(str(error))

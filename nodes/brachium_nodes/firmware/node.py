@@ -1,0 +1,236 @@
+"""The node: samples into batches, batches to the gateway, and whatever breaks put right again."""
+
+import asyncio
+import gc
+import json
+import os
+import random
+import struct
+import time
+
+from message_pack import Writer, read_map
+from web_socket import ROOM, Unauthorized, WebSocket
+
+FIRMWARE = "brachium 0.1"
+CALIBRATION = "calibration.json"  # looked at before each hello
+_STALLED_MS = 5000  # a message that does not go out, or a gateway that does not ask for the clock
+_LOOK_MS = 250
+_FIRST_PAUSE_MS = 500
+_STEADY_MS = 10000
+
+
+def calibration():
+    """Return the calibration that is kept on the node, {} when there is none or it cannot be read."""
+    try:
+        with open(CALIBRATION) as file:
+            kept = json.load(file)
+        return kept if isinstance(kept, dict) else {}
+    except (OSError, ValueError):
+        return {}
+
+
+class Refused(OSError):
+    """The gateway said no. `wait_s`: when it makes sense to try again, None: after something was changed."""
+
+    def __init__(self, said):
+        super().__init__("%s: %s" % (said.get("code"), said.get("why")))
+        self.wait_s = said.get("retry")
+
+
+class Node:
+    """`sensor` fills `batches`; `feed` is called as long as all is well."""
+
+    def __init__(self, configuration, sensor, batches, clock, battery, wifi, feed):
+        self._about = configuration
+        self._sensor, self._batches, self._clock = sensor, batches, clock
+        self._battery, self._wifi, self._feed = battery, wifi, feed
+        self._boot = struct.unpack("<I", os.urandom(4))[0]
+        self._writer = Writer(max(18 * configuration["batch"] + 128, 512), ROOM)
+        self._waiting = asyncio.Event()
+        batches.wake = self._waiting.set
+        self._link = None
+        self._heard = 0
+        self._empty = False
+
+    async def run(self):
+        """Sample and send until the battery is empty."""
+        sampling = asyncio.create_task(self._sample())
+        try:
+            await self._keep_connected()
+        finally:
+            sampling.cancel()
+
+    async def _sample(self):
+        told = time.ticks_ms()
+        while not self._empty:
+            await asyncio.sleep_ms(self._about["poll_ms"])
+            self._sensor.poll(self._clock.now)
+            self._feed()
+            if time.ticks_diff(time.ticks_ms(), told) >= 1000:
+                told = time.ticks_add(told, 1000)
+                self._sensor.clock.learn()
+                self._battery.measure()
+                self._empty = self._battery.empty()
+
+    async def _keep_connected(self):
+        pause = _FIRST_PAUSE_MS
+        longest = self._about["longest_pause_s"] * 1000
+        while not self._empty:
+            began, wait = time.ticks_ms(), 0
+            try:
+                await self._converse()
+            except Refused as refused:
+                print("refused:", refused)
+                wait = longest if refused.wait_s is None else int(refused.wait_s * 1000)
+            except Unauthorized as error:
+                print(error)
+            except (OSError, EOFError, ValueError, asyncio.TimeoutError) as error:
+                print("no connection:", repr(error))
+            gc.collect()
+            if self._empty:
+                return
+            if time.ticks_diff(time.ticks_ms(), began) > _STEADY_MS:
+                pause = _FIRST_PAUSE_MS
+            await asyncio.sleep_ms(max(min(wait, longest), pause // 2 + random.randrange(pause)))
+            pause = min(2 * pause, longest)
+
+    async def _converse(self):
+        about = self._about
+        await self._wifi.join()
+        url = about["gateway"]
+        if not url:
+            seek = about["discovery"]
+            import discovery
+
+            url = await discovery.discover(about["id"], about["token"], seek["address"], seek["port"])
+        link = await WebSocket.open(url, about["token"], self._writer, _STALLED_MS // 1000)
+        tasks = ()
+        try:
+            await link.send(self._hello)
+            welcome = read_map(await asyncio.wait_for(link.receive(), _STALLED_MS // 1000))
+            if welcome.get("m") == "refused/1":
+                raise Refused(welcome)
+            if welcome.get("m") != "welcome/1":
+                raise OSError("a gateway says welcome, not %r" % welcome.get("m"))
+            print("joined", url, "as", welcome.get("seg"), "of", welcome.get("sub"))
+            self._link, self._heard = link, time.ticks_ms()
+            self._batches.keeping = self._batches.connected = True
+            tasks = [asyncio.create_task(work(link)) for work in (self._send, self._receive, self._tell)]
+            while not any(task.done() for task in tasks) and not self._empty:
+                await asyncio.sleep_ms(_LOOK_MS)
+                if link.stuck_ms() > _STALLED_MS or self._silent_ms() > _STALLED_MS:
+                    raise OSError("the gateway has fallen silent")
+            for task in tasks:
+                if task.done():
+                    await task
+            await self._cancel(tasks)
+            await self._say_bye(link)
+        finally:
+            self._link = None
+            await self._cancel(tasks)
+            self._batches.lost_connection()
+            link.close()
+
+    async def _cancel(self, tasks):
+        for task in tasks:
+            task.cancel()
+        await asyncio.sleep_ms(0)  # each gives back what it holds
+
+    def _silent_ms(self):
+        return time.ticks_diff(time.ticks_ms(), self._heard)
+
+    async def _send(self, link):
+        batches = self._batches
+        while True:
+            batch = batches.next()
+            if batch is None:
+                self._waiting.clear()
+                await self._waiting.wait()
+                continue
+            try:
+                await link.send(batches.fill, batch)
+            except BaseException:  # cancelled, too
+                batches.unsent(batch)
+                raise
+            batches.sent(batch)
+
+    async def _receive(self, link):
+        while True:
+            message = await link.receive()
+            came = self._clock.now()
+            self._heard = time.ticks_ms()
+            said = read_map(message)
+            kind = said.get("m")
+            if kind == "clock/1":
+                await link.send(self._clock_answer, said.get("id", 0), came)
+            elif kind == "refused/1":
+                raise Refused(said)
+
+    async def _tell(self, link):
+        while True:
+            await link.send(self._status)
+            gc.collect()
+            await asyncio.sleep_ms(1000)
+
+    async def leave(self):
+        """Say goodbye, so that what was lost at the end is counted too."""
+        if self._link is not None:
+            await self._say_bye(self._link)
+
+    async def _say_bye(self, link):
+        self._batches.close()
+        batch = self._batches.next()
+        while batch is not None:
+            await asyncio.wait_for(link.send(self._batches.fill, batch), 2)
+            batch = self._batches.next()
+        await asyncio.wait_for(link.send(self._bye), 2)
+        try:
+            while True:
+                await asyncio.wait_for(link.receive(), 2)
+        except (OSError, EOFError, asyncio.TimeoutError):
+            pass
+
+    def _hello(self, writer):
+        about, driver, kept = self._about, self._sensor.driver, calibration()
+        fields = 7 + driver.magnetometer + driver.big_endian + bool(kept)
+        writer.begin(fields, "hello/1")
+        writer.text("id", about["id"])
+        writer.whole("boot", self._boot)
+        writer.text("chip", driver.chip)
+        writer.real("rate", self._sensor.rate_hz)
+        writer.text("fw", FIRMWARE)
+        writer.text("org", about["origin"])
+        if driver.magnetometer:
+            writer.yes("mag")
+        if driver.big_endian:
+            writer.yes("be")
+        if kept:
+            writer.group("cal", len(kept))
+            for name, values in kept.items():
+                writer.reals(name, values)
+        writer.group("sc", 3 if driver.magnetometer else 2)
+        writer.reals("acc", (driver.acc_step,) * 3)
+        writer.reals("gyr", (driver.gyr_step,) * 3)
+        if driver.magnetometer:
+            writer.reals("mag", driver.mag_step)
+
+    def _clock_answer(self, writer, number, came):
+        writer.begin(3, "clock/1")
+        writer.whole("id", number)
+        writer.whole("t1", came)
+        writer.whole("t2", self._clock.now())
+
+    def _status(self, writer):
+        battery, signal = self._battery, self._wifi.signal_dbm()
+        known = battery.volts is not None
+        writer.begin((2 if known else 0) + (signal is not None) + 1, "status/1")
+        if known:
+            writer.real("bat", battery.volts)
+            writer.real("bath", battery.hours)
+        if signal is not None:
+            writer.real("rssi", signal)
+        writer.whole("drop", self._batches.dropped)
+
+    def _bye(self, writer):
+        writer.begin(1, "bye/1")
+        writer.whole("next", self._sensor.clock.number)

