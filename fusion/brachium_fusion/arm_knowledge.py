@@ -1,7 +1,7 @@
 """What is known of one arm before it moves: its joints' axes and centres as its sensors see them. Pure."""
 
 from collections.abc import Collection, Mapping
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 from math import radians
 from typing import Any
 
@@ -9,11 +9,13 @@ import numpy as np
 import numpy.typing as npt
 
 from brachium_body import rotation
+from brachium_body.kinematics import TRUNK_FROM_THORAX
 from brachium_body.lengths import ArmLengths
 from brachium_body.segments import Side, arm_segments
 from brachium_fusion.joint_model import Joint
 from brachium_fusion.pose import Alignment
 from brachium_fusion.shoulder_model import ArmModel
+from brachium_fusion.shoulder_trunk import shoulder_from_pelvis
 
 Floats = npt.NDArray[np.float64]
 Centres = Mapping[str, tuple[int, Mapping[str, Floats]]]
@@ -23,6 +25,12 @@ ABOVE_EPICONDYLE_M, ABOVE_WRIST_M = 0.04, 0.03
 """Where sensors are worn as told: upper arm lateral, forearm dorsal, this far above the joint below."""
 OFF_UPPER_ARM_M, OFF_FOREARM_M, OFF_HAND_M = 0.04, 0.03, 0.02
 """From the segment's middle line to the chip."""
+WORN_SD_M = 0.02
+"""Of each lever arm, along each axis, for sensors worn as told."""
+MEASURED_SD_M = 0.01
+"""Of one that was measured."""
+POSE_HEADING_SD = radians(10.0)
+"""How well a pose, with sensors put on as told, gives the heading between two of them."""
 UNSURE_AXIS = radians(10.0)
 """An axis that is not known better than this binds nothing."""
 ON_HAND = 0.41
@@ -39,6 +47,10 @@ class ArmKnowledge:
     """For the shoulder's displacement; None without upper arm and forearm aligned."""
     carrying_known: bool = False
     """Movement showed the elbow's axes."""
+    heading_sd: Mapping[str, float] = field(default_factory=dict)
+    """By joint, rad: how well calibration knows the heading between its sensors."""
+    trunk: Floats | None = None
+    """(3,) m from the middle of the pelvis to the shoulder, in the sternum sensor's axes; None without it."""
 
     def without_shoulder(self) -> "ArmKnowledge":
         """Return the same without what the shoulder needs."""
@@ -82,7 +94,24 @@ def arm_knowledge(
     if wrist is not None and not shown["wrist"] and {forearm, hand} <= set(magnetometers):
         wrist = _centre_only(wrist) if "wrist" in stated else None
     model = _model(side, alignment, lengths, stated)
-    return ArmKnowledge(elbow=elbow, wrist=wrist, model=model, carrying_known=shown["elbow"])
+    return ArmKnowledge(
+        elbow=elbow,
+        wrist=wrist,
+        model=model,
+        carrying_known=shown["elbow"],
+        heading_sd={
+            name: found[f"{name}_{side[0]}"].heading_sd_rad if known else POSE_HEADING_SD
+            for name, known in shown.items()
+        },
+        trunk=None if model is None else _trunk(side, alignment, lengths),
+    )
+
+
+def _trunk(side: Side, alignment: Alignment | None, lengths: ArmLengths) -> Floats | None:
+    if alignment is None or "sternum" not in alignment.mounting or "sternum" in alignment.assumed:
+        return None
+    trunk_from_sensor = rotation.multiply(TRUNK_FROM_THORAX, alignment.mounting["sternum"])
+    return rotation.rotate(rotation.inverse(trunk_from_sensor), shoulder_from_pelvis(lengths, side))
 
 
 def _centre_only(joint: Joint) -> Joint:
@@ -107,6 +136,7 @@ def _model(side: Side, alignment: Alignment | None, lengths: ArmLengths, stated:
         lever_forearm=rotation.rotate(from_forearm, -on_forearm) if told_elbow is None else told_elbow,
         carrying_rad=0.0 if elbow is None else elbow.carrying_rad,
         side=side,
+        lever_sd_m=WORN_SD_M if told_shoulder is None or told_elbow is None else MEASURED_SD_M,
     )
 
 

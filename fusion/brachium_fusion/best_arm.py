@@ -9,8 +9,8 @@ import numpy.typing as npt
 from brachium_body import rotation
 from brachium_body.lengths import ArmLengths
 from brachium_body.segments import Side, arm_segments
-from brachium_fusion.arm_knowledge import Centres, arm_knowledge
-from brachium_fusion.joint_model import Joint
+from brachium_fusion.arm_knowledge import ArmKnowledge, Centres, arm_knowledge
+from brachium_fusion.humeral_rotation import HumeralRotation
 from brachium_fusion.joint_smoother import smooth_joint
 from brachium_fusion.pose import Alignment
 from brachium_fusion.sensor_to_segment import Span
@@ -78,30 +78,32 @@ def solve_arm(
     magnetometers = [s for s, one in tracked.items() if one.magnetometer]
     knowledge = arm_knowledge(side, alignment, lengths, stated, magnetometers)
     if knowledge.elbow is not None:
-        _bind("elbow", knowledge.elbow, upper, forearm, tracked, rate_hz, solution)
+        _bind("elbow", knowledge, upper, forearm, tracked, rate_hz, solution)
     if alignment is not None and pose is not None and knowledge.model is not None:
-        _smooth_shoulder(knowledge.model, tracked, (upper, forearm), pose, rate_hz, solution)
-        if "sternum" not in tracked and solution.shift is not None:
+        _smooth_shoulder(knowledge, tracked, (upper, forearm), pose, rate_hz, solution)
+        if knowledge.trunk is None and solution.shift is not None:
             solution.warnings.append(NOT_OBSERVABLE_WITHOUT_STERNUM)
     if knowledge.wrist is not None:
-        _bind("wrist", knowledge.wrist, forearm, hand, tracked, rate_hz, solution, keep_near=True)
+        _bind("wrist", knowledge, forearm, hand, tracked, rate_hz, solution)
+    if knowledge.carrying_known and knowledge.model is not None:
+        _untwist(knowledge.model, tracked, (upper, forearm))
     return solution
 
 
 def _bind(
     name: str,
-    joint: Joint,
+    knowledge: ArmKnowledge,
     near: str,
     far: str,
     tracked: Mapping[str, Tracked],
     rate_hz: float,
     solution: ArmSolution,
-    *,
-    keep_near: bool = False,
 ) -> None:
+    joint = knowledge.elbow if name == "elbow" else knowledge.wrist
     a, b = tracked.get(near), tracked.get(far)
-    if a is None or b is None or not (a.raw and b.raw):
+    if joint is None or a is None or b is None or not (a.raw and b.raw):
         return
+    shared = a.magnetometer and b.magnetometer
     found = smooth_joint(
         joint,
         rate_hz,
@@ -109,11 +111,12 @@ def _bind(
         b.motion,
         a.world_from_sensor,
         b.world_from_sensor,
-        a.magnetometer and b.magnetometer,
+        shared,
+        None if shared else knowledge.heading_sd.get(name),
     )
     known = np.isfinite(found.world_from_b[:, 0]) & np.isfinite(found.world_from_a[:, 0])
     far_q = found.world_from_b
-    if keep_near:  # the joint above has turned it already: the rest of the arm turns with it
+    if name == "wrist":  # the joint above has turned it already: the rest of the arm turns with it
         turn = rotation.heading(rotation.multiply(a.world_from_sensor, rotation.inverse(found.world_from_a)))
         far_q = rotation.multiply(rotation.about(2, turn), far_q)
     else:
@@ -124,13 +127,14 @@ def _bind(
 
 
 def _smooth_shoulder(
-    model: ArmModel,
+    knowledge: ArmKnowledge,
     tracked: Mapping[str, Tracked],
     segments: tuple[str, str],
     pose: Span,
     rate_hz: float,
     solution: ArmSolution,
 ) -> None:
+    assert knowledge.model is not None
     upper, forearm = (tracked.get(s) for s in segments)
     name = f"shoulder_{solution.side[0]}"
     if upper is None or forearm is None:
@@ -140,13 +144,14 @@ def _smooth_shoulder(
         return
     try:
         found = smooth_shoulder(
-            model,
+            knowledge.model,
             rate_hz,
             upper.motion,
             forearm.motion,
             upper.world_from_sensor,
             forearm.world_from_sensor,
             slice(pose.first, pose.end),
+            trunk_velocity=_trunk_velocity(knowledge, tracked, pose),
         )
     except ValueError as error:
         solution.refused[name] = str(error)
@@ -160,3 +165,23 @@ def _smooth_shoulder(
     shift[~use | missing] = np.nan
     solution.shift = shift
     solution.parts[name] = "error-state smoother of both sensors"
+
+
+def _trunk_velocity(knowledge: ArmKnowledge, tracked: Mapping[str, Tracked], pose: Span) -> Floats | None:
+    """Return how fast the trunk carries the shoulder, (n, 3) m/s; None without a sensor on the sternum."""
+    sternum = tracked.get("sternum")
+    if knowledge.trunk is None or sternum is None or not sternum.raw:
+        return None
+    bias = np.nanmean(sternum.samples.gyr[pose.first : pose.end], axis=0)
+    swing = np.cross(sternum.samples.gyr - bias, knowledge.trunk)
+    return np.nan_to_num(rotation.rotate(sternum.world_from_sensor, swing))
+
+
+def _untwist(model: ArmModel, tracked: Mapping[str, Tracked], segments: tuple[str, str]) -> None:
+    """Turn the upper arm about its length to where the bent forearm shows it."""
+    upper, forearm = (tracked[s] for s in segments)
+    bone = HumeralRotation(model.carrying_rad, model.side).correct(
+        rotation.multiply(upper.world_from_sensor, model.sensor_from_upper_arm),
+        rotation.multiply(forearm.world_from_sensor, model.sensor_from_forearm),
+    )
+    upper.world_from_sensor = rotation.multiply(bone, rotation.inverse(model.sensor_from_upper_arm))

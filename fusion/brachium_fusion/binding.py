@@ -10,10 +10,11 @@ from brachium_body import rotation
 from brachium_body.lengths import ArmLengths
 from brachium_body.segments import SIDES, Side, arm_segments
 from brachium_fusion.arm_knowledge import Centres, arm_knowledge
-from brachium_fusion.live_arm import LiveArm, SensorNow
+from brachium_fusion.live_arm import LiveArm
 from brachium_fusion.live_shoulder import RestMean
 from brachium_fusion.pose import Alignment
-from brachium_fusion.timeline import Motion, Reading, Shift
+from brachium_fusion.strap_slip import Slip
+from brachium_fusion.timeline import Motion, Reading, SensorNow, Shift
 from brachium_fusion.track import STILL_RAD_S, SegmentTrack
 
 Floats = npt.NDArray[np.float64]
@@ -31,6 +32,15 @@ class Known(NamedTuple):
     """Follow the shoulder."""
 
 
+class Bound(NamedTuple):
+    """What the joints make of an instant."""
+
+    readings: Readings
+    shifts: dict[Side, Shift]
+    slips: list[Slip]
+    """Straps that were found to have slipped at this instant."""
+
+
 class Binding:
     """The estimators of both arms."""
 
@@ -40,16 +50,16 @@ class Binding:
         self._revision = -1
         self._arms: dict[Side, tuple[Any, LiveArm]] = {}
         self._rests: dict[str, RestMean] = {}
+        self._slipped: set[str] = set()
 
-    def correct(
-        self, now: int, readings: Readings, known: Known, revision: int
-    ) -> tuple[Readings, dict[Side, Shift]]:
-        """Return the readings at an instant, corrected where a joint tells more, and the shifts."""
+    def correct(self, now: int, readings: Readings, known: Known, revision: int) -> Bound:
+        """Return the readings at an instant, corrected where a joint tells more; a sensor whose strap slipped
+        is disturbed until the next calibration."""
         self._refresh(known, revision)
         if not self._rests:
-            return readings, {}
+            return Bound(readings, {}, [])
         motions = self._motions(now, readings, known)
-        result, shifts = dict(readings), dict[Side, Shift]()
+        result, shifts, slips = dict(readings), dict[Side, Shift](), list[Slip]()
         for side, (_, arm) in self._arms.items():
             sensors = {
                 segment: SensorNow(_turned(known.alignment, segment, readings[segment]), motions[segment])
@@ -59,12 +69,19 @@ class Binding:
             found = arm.step(now, sensors, self._rests)
             if found.shift is not None:
                 shifts[side] = found.shift
+            if found.slip is not None:
+                slips.append(found.slip)
+                self._slipped.add(found.slip.segment)
             for segment, turned in found.world_from_sensor.items():
                 reading = readings[segment]
                 assert reading is not None
                 q = rotation.multiply(_heading(known.alignment, segment, -1.0), turned)
                 result[segment] = reading._replace(before=q, after=q, fraction=0.0)
-        return result, shifts
+        for segment in self._slipped:
+            reading = result.get(segment)
+            if reading is not None and reading.quality == "good":
+                result[segment] = reading._replace(quality="disturbed")
+        return Bound(result, shifts, slips)
 
     def _motions(self, now: int, readings: Readings, known: Known) -> dict[str, Motion]:
         """Return the motion of every raw sensor that is there, and note who is still."""
@@ -95,13 +112,15 @@ class Binding:
                 knowledge = knowledge.without_shoulder()
             basis = (
                 knowledge.plain(),
-                [(s, s in raw, s in magnetometers, turns.get(s, 0.0)) for s in segments],
+                [(s, s in raw, s in magnetometers, turns.get(s, 0.0)) for s in ("sternum", *segments)],
             )
             if sum(s in raw for s in segments) < 2:
                 self._arms.pop(side, None)
             elif side not in self._arms or self._arms[side][0] != basis:
-                self._arms[side] = basis, LiveArm(segments, knowledge, self.rate_hz, magnetometers)
-        worn = {s for side in self._arms for s in arm_segments(side) if s in raw}
+                arm = LiveArm(segments, knowledge, self.rate_hz, magnetometers, frozenset(raw))
+                self._arms[side] = basis, arm
+                self._slipped -= set(segments)
+        worn = {s for _, arm in self._arms.values() for s in arm.segments if s in raw}
         self._rests = {s: self._rests.get(s) or RestMean() for s in sorted(worn)}
 
     def state(self, known: Known, revision: int) -> dict[str, Any]:
@@ -109,6 +128,7 @@ class Binding:
         self._refresh(known, revision)
         return {
             "arms": {side: arm.state() for side, (_, arm) in self._arms.items()},
+            "slipped": sorted(self._slipped),
             "rests": {segment: rest.state() for segment, rest in self._rests.items()},
         }
 
@@ -117,6 +137,7 @@ class Binding:
         self._refresh(known, revision)
         for side, (_, arm) in self._arms.items():
             arm.restore(state["arms"][side])
+        self._slipped = set(state["slipped"])
         for segment, rest in self._rests.items():
             rest.restore(state["rests"][segment])
 

@@ -88,6 +88,12 @@ class Calibrating:
         self._watch = PoseWatch(PoseWish(from_ns=now)) if self._auto_pose else None
         self.say(now, "waiting", reason="another run of these sensors: stand still in the pose")
 
+    def warn(self, now: int, text: str) -> None:
+        """Tell something that a person should know of what is calibrated."""
+        if self.alignment is not None:
+            self.alignment = replace(self.alignment, warnings=(*self.alignment.warnings, text))
+            self.say(now, "done" if self._watch is None and self._fitting_ns is None else "running")
+
     # -- what the sensors show ---------------------------------------------------------------------------
 
     def see(

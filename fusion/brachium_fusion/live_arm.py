@@ -5,6 +5,7 @@ Two sensors on one joint know more together. Corrections are turns from the left
 """
 
 from collections.abc import Mapping
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,16 +16,14 @@ from brachium_fusion.arm_knowledge import ArmKnowledge
 from brachium_fusion.humeral_rotation import HumeralRotation
 from brachium_fusion.joint_filter import JointEstimate, JointFilter
 from brachium_fusion.live_shoulder import LiveShoulder, RestMean
-from brachium_fusion.timeline import Motion, Shift
+from brachium_fusion.strap_slip import Slip, SlipWatch
+from brachium_fusion.timeline import SensorNow, Shift
 
 Floats = npt.NDArray[np.float64]
 
 
-class SensorNow(NamedTuple):
-    """One sensor at an instant: orientation (4,), its heading as the pose set it, rate and force."""
-
-    world_from_sensor: Floats
-    motion: Motion
+RESTED = 25
+"""Instants of stillness that show a gyroscope's bias."""
 
 
 class ArmNow(NamedTuple):
@@ -33,6 +32,8 @@ class ArmNow(NamedTuple):
     world_from_sensor: dict[str, Floats]
     """(4,) of the segments about which a joint says something."""
     shift: Shift | None
+    slip: Slip | None
+    """A strap that slipped, at the instant in which it became certain."""
 
 
 class LiveArm:
@@ -44,15 +45,19 @@ class LiveArm:
         knowledge: ArmKnowledge,
         rate_hz: float,
         magnetometers: frozenset[str],
+        worn: frozenset[str],
     ) -> None:
+        """Begin with what is known; `worn` are the segments whose sensors deliver samples."""
         self._upper, self._forearm, self._hand = segments
         self._joints: dict[str, JointFilter] = {}
         if knowledge.elbow is not None:
             shared = {self._upper, self._forearm} <= magnetometers
-            self._joints["elbow"] = JointFilter(knowledge.elbow, rate_hz, shared)
+            start_sd = None if shared else knowledge.heading_sd.get("elbow")
+            self._joints["elbow"] = JointFilter(knowledge.elbow, rate_hz, shared, start_sd)
         if knowledge.wrist is not None:
             shared = {self._forearm, self._hand} <= magnetometers
-            self._joints["wrist"] = JointFilter(knowledge.wrist, rate_hz, shared)
+            start_sd = None if shared else knowledge.heading_sd.get("wrist")
+            self._joints["wrist"] = JointFilter(knowledge.wrist, rate_hz, shared, start_sd)
         self._shoulder, self._humerus = None, None
         model = knowledge.model
         if model is not None:
@@ -60,15 +65,22 @@ class LiveArm:
         if model is not None and knowledge.carrying_known:
             self._humerus = HumeralRotation(model.carrying_rad, model.side)
             self._sensor_from = model.sensor_from_upper_arm, model.sensor_from_forearm
+        watched = [s for s in segments if s in worn]
+        joints = {self._upper: knowledge.elbow, self._forearm: knowledge.wrist}
+        between = [joints[s] if s in worn and after in worn else None for s, after in pairwise(segments)]
+        self._slips = None
+        if knowledge.model is not None:
+            self._slips = SlipWatch(watched, rate_hz, between[: len(watched) - 1])
+        self._trunk = knowledge.trunk
+        self._bias = np.zeros(3)
         self._period_ns = 1e9 / rate_hz
         self._last_ns: dict[str, int] = {}
 
     @property
     def segments(self) -> tuple[str, ...]:
         """Whose samples it wants."""
-        if "wrist" in self._joints:
-            return (self._upper, self._forearm, self._hand)
-        return (self._upper, self._forearm) if self._joints or self._shoulder is not None else ()
+        trunk = () if self._trunk is None else ("sternum",)
+        return (*trunk, self._upper, self._forearm, self._hand)
 
     def step(self, now: int, sensors: Mapping[str, SensorNow], rests: Mapping[str, RestMean]) -> ArmNow:
         """Return what the joints tell at an instant, of the sensors that are there."""
@@ -88,7 +100,15 @@ class LiveArm:
                 found[hand] = rotation.multiply(about_up, estimate.world_from_b)
             else:
                 found[forearm], found[hand] = estimate.world_from_a, estimate.world_from_b
-        return ArmNow(found, shift)
+        return ArmNow(found, shift, self._slipped(now, found, sensors))
+
+    def _slipped(
+        self, now: int, found: Mapping[str, Floats], sensors: Mapping[str, SensorNow]
+    ) -> Slip | None:
+        if self._slips is None:
+            return None
+        seen = {s: SensorNow(found.get(s, one.world_from_sensor), one.motion) for s, one in sensors.items()}
+        return self._slips.step(now, seen)
 
     def _elbow(self, now: int, upper: SensorNow, forearm: SensorNow) -> tuple[Floats, Floats]:
         if "elbow" not in self._joints:
@@ -104,19 +124,31 @@ class LiveArm:
         rests: Mapping[str, RestMean],
     ) -> Shift | None:
         """Put better orientations into `found`; return the shift, None while it is not known."""
-        if self._shoulder is None:
+        if self._shoulder is None or (self._trunk is not None and "sternum" not in sensors):
             return None
         upper, forearm = self._upper, self._forearm
+        carried = None
+        if self._trunk is not None:
+            sternum = sensors["sternum"]
+            rate = sternum.motion.gyr - self._sternum_bias(rests["sternum"])
+            carried = rotation.rotate(sternum.world_from_sensor, np.cross(rate, self._trunk))
         estimate = self._shoulder.step(
             (found[upper], found[forearm]),
             (sensors[upper].motion, sensors[forearm].motion),
             (rests[upper], rests[forearm]),
             self._missing_s("shoulder", now),
+            carried,
         )
         if estimate is None or not estimate.valid:
             return None
         found[upper], found[forearm] = estimate.world_from_upper, estimate.world_from_forearm
         return Shift(estimate.shift_m, np.sqrt(np.diag(estimate.covariance)))
+
+    def _sternum_bias(self, rest: RestMean) -> Floats:
+        """Return the gyroscope's bias as its last rest of some length showed it."""
+        if rest.count >= RESTED:
+            self._bias = rest.bias
+        return self._bias
 
     def _untwisted(self, upper: Floats, forearm: Floats) -> Floats:
         """Return the upper-arm sensor's orientation as if it had followed the humerus about its length."""
@@ -150,6 +182,8 @@ class LiveArm:
             "joints": {name: joint.state() for name, joint in self._joints.items()},
             "shoulder": None if self._shoulder is None else self._shoulder.state(),
             "humerus": None if self._humerus is None else self._humerus.state(),
+            "slips": None if self._slips is None else self._slips.state(),
+            "bias": self._bias.tolist(),
             "last_ns": self._last_ns,
         }
 
@@ -161,4 +195,6 @@ class LiveArm:
             self._shoulder.restore(state["shoulder"])
         if self._humerus is not None:
             self._humerus.restore(state["humerus"])
-        self._last_ns = dict(state["last_ns"])
+        if self._slips is not None:
+            self._slips.restore(state["slips"])
+        self._bias, self._last_ns = np.array(state["bias"]), dict(state["last_ns"])

@@ -62,8 +62,10 @@ class LiveShoulder:
         motion: tuple[Motion, Motion],
         rests: tuple[RestMean, RestMean],
         missing_s: float,
+        trunk_velocity: Floats | None = None,
     ) -> ShoulderEstimate | None:
-        """Take the sensors of upper arm and forearm at an instant; None before the first rest."""
+        """Take the sensors of upper arm and forearm at an instant, and how fast the trunk carries the
+        shoulder, (3,) m/s; None before the first rest."""
         (upper, forearm), (upper_motion, forearm_motion) = world_from, motion
         if self._filter is None:
             if min(rests[0].count, rests[1].count) < REST_S * self._rate_hz:
@@ -74,6 +76,7 @@ class LiveShoulder:
             upper_motion.acc,
             forearm_motion.gyr,
             forearm_motion.acc,
+            trunk_velocity=trunk_velocity,
             world_from_upper=upper,
             world_from_forearm=forearm,
             missing_s=missing_s,

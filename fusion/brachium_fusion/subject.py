@@ -209,7 +209,9 @@ class Subject:
                 self.revision += 1
             shifts: dict[Side, Shift] = {}
             if self._settings.binds:
-                readings, shifts = self.binding.correct(now, readings, self._known(), self.revision)
+                readings, shifts, slips = self.binding.correct(now, readings, self._known(), self.revision)
+                for slip in slips:
+                    self.calibrating.warn(now, slip.text)
             yield Instant(
                 now,
                 readings,

@@ -31,6 +31,13 @@ class Motion(NamedTuple):
     acc: Floats
 
 
+class SensorNow(NamedTuple):
+    """One sensor at an instant: orientation (4,), its heading as the pose set it, rate and force."""
+
+    world_from_sensor: Floats
+    motion: Motion
+
+
 class Shift(NamedTuple):
     """Displacement of a shoulder since the pose, and its standard deviation: (3,) m in world axes."""
 

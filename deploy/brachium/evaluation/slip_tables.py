@@ -9,10 +9,9 @@ from brachium.evaluation.tables import Cell, Limit, Table, middle
 from brachium_body import rotation
 from brachium_body.segments import Segment, arm_segments
 from brachium_fusion.joint_model import Joint
-from brachium_fusion.live_arm import SensorNow
 from brachium_fusion.orientation import make
 from brachium_fusion.strap_slip import Slip, SlipWatch
-from brachium_fusion.timeline import Motion
+from brachium_fusion.timeline import Motion, SensorNow
 from brachium_nodes.sensors import LEVELS
 from brachium_nodes.session import SessionArrays, session_arrays
 from brachium_nodes.wearer import WearerSettings
