@@ -5,7 +5,7 @@ joints and shoulder are smoothed, and the arm is computed as live. A part that c
 reason and left as the part before it gave it.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -46,8 +46,13 @@ class Best:
     warnings: list[str] = field(default_factory=list)
 
 
-def solve(material: Material, settings: Settings, times_s: Floats) -> Best:
-    """Return the skeletons at the instants (n,) s. Raises ValueError for a sensor of a single sample."""
+def solve(
+    material: Material, settings: Settings, times_s: Floats, one_arm: Callable[..., ArmSolution] = solve_arm
+) -> Best:
+    """Return the skeletons at the instants (n,) s; `one_arm` stands for solve_arm.
+
+    Raises ValueError for a sensor of a single sample.
+    """
     best = Best(skeletons=[], alignment=None)
     series = {
         s: calibrated(raw, material.infos[s], magnetometer=settings.magnetometer)
@@ -59,7 +64,7 @@ def solve(material: Material, settings: Settings, times_s: Floats) -> Best:
     spans = rows_of_spans(material, tracked, time_s, rate_hz)
     best.alignment = _align(material, tracked, spans, rate_hz, best)
     solutions = [
-        solve_arm(
+        one_arm(
             side,
             tracked,
             best.alignment,

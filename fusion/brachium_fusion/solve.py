@@ -4,12 +4,15 @@
 """
 
 from collections import Counter
+from functools import partial
 
 import numpy as np
 import numpy.typing as npt
 
 from brachium_fusion import best, from_capture, from_recording
+from brachium_fusion.best_arm import solve_arm
 from brachium_fusion.best_material import Material
+from brachium_fusion.orientation import FilterName
 from brachium_fusion.result import tabulate
 from brachium_fusion.settings import Settings
 from brachium_fusion.solve_terms import (
@@ -21,6 +24,7 @@ from brachium_fusion.solve_terms import (
     SolveReport,
     SolveSettings,
 )
+from brachium_fusion.zhou_recording import ZhouName, solve_zhou
 from brachium_wire import capture as captures
 from brachium_wire import recording, table
 
@@ -47,13 +51,21 @@ def run(settings: SolveSettings) -> SolveReport:
     return _finish(settings, _recording(settings))
 
 
+def _split(name: FilterName | ZhouName | None) -> tuple[ZhouName | None, FilterName | None]:
+    """Return the name as that of Zhou's system, which takes a whole recording, or as a filter's."""
+    if name == "zhou" or name == "zhou-printed":
+        return name, None
+    return None, name
+
+
 def _capture(settings: SolveSettings) -> Outcome:
     capture = captures.load(settings.input)
     times = from_capture.output_times(capture, settings.rate_hz)
     times_ns = from_capture.nanoseconds(times).tolist()
-    chosen = Settings(filter=settings.filter or "auto", magnetometer=settings.magnetometer, auto_pose=False)
-    if settings.mode == "best":
-        return _best(from_capture.material(capture), chosen, times, times_ns, times, {})
+    zhou, filter_name = _split(settings.filter)
+    chosen = Settings(filter=filter_name or "auto", magnetometer=settings.magnetometer, auto_pose=False)
+    if settings.mode == "best" or zhou:
+        return _best(from_capture.material(capture), chosen, times, times_ns, times, {}, zhou)
     pipeline, alignment = from_capture.solve(capture, chosen, times)
     return Outcome(
         chosen=chosen,
@@ -73,8 +85,10 @@ def _best(
     times_ns: list[int],
     shown_s: npt.NDArray[np.float64],
     metadata: dict[str, object],
+    zhou: ZhouName | None = None,
 ) -> Outcome:
-    found = best.solve(material, chosen, times_s)
+    one_arm = solve_arm if zhou is None else partial(solve_zhou, zhou)
+    found = best.solve(material, chosen, times_s, one_arm)
     nothing = [NO_CALIBRATION] if found.alignment is None else []
     return Outcome(
         chosen=chosen,
@@ -103,10 +117,11 @@ def _recording(settings: SolveSettings) -> Outcome:
         raise SolveError(f"{settings.input}: holds no subject {name!r}; there are {', '.join(subjects)}")
     contents = subjects[name]
     live = from_recording.settings_of(contents)
-    chosen = live.chosen(settings.filter, settings.magnetometer, settings.rate_hz)
+    zhou, filter_name = _split(settings.filter)
+    chosen = live.chosen(filter_name, settings.magnetometer, settings.rate_hz)
     warnings = [warning] if warning else []
-    if settings.mode == "best":
-        return _best_recording(name, contents, chosen, warnings)
+    if settings.mode == "best" or zhou:
+        return _best_recording(name, contents, chosen, warnings, zhou)
     pipeline, solved = from_recording.solve(name, contents, chosen)
     skeletons = [s.skeleton for s in solved if s.subject == name]
     compared, angle, position = (
@@ -130,7 +145,11 @@ def _recording(settings: SolveSettings) -> Outcome:
 
 
 def _best_recording(
-    name: str, contents: from_recording.Contents, chosen: Settings, warnings: list[str]
+    name: str,
+    contents: from_recording.Contents,
+    chosen: Settings,
+    warnings: list[str],
+    zhou: ZhouName | None,
 ) -> Outcome:
     material = from_recording.material(contents)
     first_s, last_s = material.span_s()
@@ -140,7 +159,7 @@ def _best_recording(
     times_ns = ((first + np.arange(count)) * period_ns).tolist()
     times_s = np.asarray(1e-9 * (np.array(times_ns, dtype=np.int64) - material.zero_ns), dtype=np.float64)
     metadata: dict[str, object] = {"subject": name, "time_zero_ns": times_ns[0]}
-    outcome = _best(material, chosen, times_s, times_ns, times_s - times_s[0], metadata)
+    outcome = _best(material, chosen, times_s, times_ns, times_s - times_s[0], metadata, zhou)
     outcome.warnings[:0] = warnings
     return outcome
 
@@ -159,7 +178,7 @@ def _finish(settings: SolveSettings, outcome: Outcome) -> SolveReport:
             {
                 "made_by": "brachium solve",
                 "input": settings.input.name,
-                "filter": chosen.filter,
+                "filter": _split(settings.filter)[0] or chosen.filter,
                 "magnetometer": chosen.magnetometer,
                 "mode": settings.mode,
                 "forward": forward,
@@ -177,7 +196,7 @@ def _finish(settings: SolveSettings, outcome: Outcome) -> SolveReport:
     return SolveReport(
         rows=len({s.time_ns for s in skeletons}),
         sides=sorted({s.side for s in skeletons}),
-        filter=chosen.filter,
+        filter=_split(settings.filter)[0] or chosen.filter,
         forward=forward,
         quality={segment: dict(counts) for segment, counts in quality.items()},
         drops=dict(outcome.drops),

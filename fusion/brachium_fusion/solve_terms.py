@@ -13,6 +13,7 @@ from brachium_fusion.orientation import FilterName
 from brachium_fusion.pose import Alignment
 from brachium_fusion.result import GROUPS, Group
 from brachium_fusion.settings import Settings
+from brachium_fusion.zhou_recording import ZhouName
 from brachium_wire.messages import Forward, Skeleton
 
 Mode = Literal["live", "best"]
@@ -38,7 +39,7 @@ class SolveSettings:
     """`.csv` or `.parquet`; None writes nothing."""
     subject: str | None = None
     """Which subject of a recording; needed only where there are several."""
-    filter: FilterName | None = None
+    filter: FilterName | ZhouName | None = None
     """None: what the recording used live; `auto` for a capture folder."""
     magnetometer: bool = True
     rate_hz: float | None = None

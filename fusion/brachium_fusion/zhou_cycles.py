@@ -11,6 +11,8 @@ Floats = npt.NDArray[np.float64]
 
 SHORTEST_S, LONGEST_S = 1.0, 15.0
 """How long one repetition of an exercise takes."""
+WHOLE = 0.8
+"""Of a repetition, when the recording ends: it is taken for a whole one."""
 DEGREE = 5
 """Of the polynomials fitted to each repetition. The paper says polynomial regression; the degree is ours."""
 
@@ -46,6 +48,8 @@ def find_cycles(gyr: Floats, rate_hz: float) -> list[int]:
     reach = period // 6
     beginnings = range(first, n, period)
     near = [max(0, b - reach) + int(np.argmin(energy[max(0, b - reach) : b + reach + 1])) for b in beginnings]
+    if near and n - near[-1] > WHOLE * period:
+        near.append(n - 1)
     return [int(b) for b in near] if len(near) > 1 else []
 
 

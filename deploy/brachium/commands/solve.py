@@ -29,7 +29,8 @@ def configure(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--subject", help="which subject of a recording; needed where there are several")
     parser.add_argument(
-        "--filter", help="auto, vqf, complementary or complementary-printed (default: as live)"
+        "--filter",
+        help="auto, vqf, complementary, complementary-printed, zhou or zhou-printed (default: as live)",
     )
     parser.add_argument(
         "--mode",
@@ -50,9 +51,11 @@ def run(args: argparse.Namespace) -> int:
     from brachium_fusion import solve
     from brachium_fusion.orientation import FILTERS
     from brachium_fusion.result import GROUPS
+    from brachium_fusion.zhou_recording import ZHOU
 
-    if args.filter is not None and args.filter not in FILTERS:
-        raise Usage(f"--filter {args.filter!r} is not known; choose one of {', '.join(FILTERS)}")
+    if args.filter is not None and args.filter not in (*FILTERS, *ZHOU):
+        known = ", ".join((*FILTERS, *ZHOU))
+        raise Usage(f"--filter {args.filter!r} is not known; choose one of {known}")
     if args.out is not None:
         _check_writable(args.out)
     report = solve.run(
