@@ -34,8 +34,8 @@ METHODS = ("auto", "best")
 
 
 def sensor_sets(context: Context) -> list[Table]:
-    """Return every set on both sides, live and best, one table a level."""
-    return [_table(context, level) for level in context.levels]
+    """Return every set on both sides, live and best, at the last level that was asked for."""
+    return [_table(context, context.levels[-1])]
 
 
 def _table(context: Context, level: Level) -> Table:
