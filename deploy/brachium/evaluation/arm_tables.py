@@ -114,8 +114,8 @@ def _arm(context: Context, level: Level) -> Table:
         notes=(
             "Calibrated by the guided routine first (standing, elbow flexions, pronations, both), the first "
             "row by standing alone. Emulated "
-            f"right arm; figures with a limit are the median of seeds {', '.join(map(str, context.seeds))}, the "
-            f"others of seed {context.seeds[0]}.",
+            f"right arm; figures with a limit: median of seeds {', '.join(map(str, context.seeds))}, others: "
+            f"seed {context.seeds[0]}.",
         ),
     )
 
