@@ -15,6 +15,7 @@ from websockets.http11 import Request, Response
 from brachium_nodes.assign_command import serve_assign
 from brachium_nodes.connection import Connection
 from brachium_nodes.conversation import Conversation
+from brachium_nodes.discovery import answer_seekers
 from brachium_nodes.host_claim import HostClaims, checked_host
 from brachium_nodes.known_calibrations import calibrations_in
 from brachium_nodes.listening import CannotListen, listening_address, why_not
@@ -44,6 +45,8 @@ class GatewaySettings:
     bind: str = "127.0.0.1"
     port: int = 8765
     """0 takes any free port; the health's text says which."""
+    discovery_port: int | None = None
+    """Where nodes that do not know the gateway's address are heard, by UDP; None: nowhere."""
     nodes: tuple[NodeEntry, ...] = ()
     join_token_sha256: str | None = None
     """A token with which new nodes may knock; they wait until they are assigned."""
@@ -107,10 +110,13 @@ class Gateway:
             serve_assign(self._bus, settings.room, asyncio.get_running_loop(), self._assign)
             log.info("gateway %s takes nodes at %s", settings.id, self._heart.text)
             self._beat(now=True)
-            while not stop.is_set():
-                await asyncio.sleep(STOP_LOOK_S)
-                self._beat()
-                self._give_way()
+            async with answer_seekers(
+                address, settings.discovery_port, self._heart.text, self._roster.token_of
+            ):
+                while not stop.is_set():
+                    await asyncio.sleep(STOP_LOOK_S)
+                    self._beat()
+                    self._give_way()
         self._beat(now=True)
         log.info("gateway %s ended", settings.id)
 

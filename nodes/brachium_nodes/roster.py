@@ -134,6 +134,11 @@ class Roster:
         entry = self._entries.get(node)
         return entry.subject if entry is not None else None
 
+    def token_of(self, node: str) -> str | None:
+        """Return the SHA-256 of the token with which a node may come, or None for one that may not."""
+        entry = self._entries.get(node)
+        return entry.token_sha256 if entry is not None else self._join
+
     def place_of(self, node: str) -> tuple[str, str] | None:
         """Return the subject and segment a node is assigned to."""
         entry = self._entries.get(node)

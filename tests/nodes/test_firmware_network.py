@@ -140,12 +140,13 @@ def now_us() -> int:
     return (time.monotonic_ns() // 1000) % (1 << 30)
 
 
-def test_the_field_is_turned_into_the_accelerometers_axes_at_its_own_sample(
-    firmware, gateway, listener, tmp_path
+def test_a_gateway_is_found_and_the_field_turned_into_the_accelerometers_axes_at_its_own_sample(
+    firmware, gateway, listener, tmp_path, free_port
 ) -> None:
     one = Worn(tmp_path, "forearm_r", 50.0, BoardSettings(field_adjust=(200, 128, 60)))
-    url = gateway(entry("forearm_r", "forearm_r")).url
-    with switched_on(one.start(firmware, url)):
+    gateway(entry("forearm_r", "forearm_r"), discovery_port=free_port)
+    seek = {"address": "127.255.255.255", "port": free_port}
+    with switched_on(one.start(firmware, "", discovery=seek)):
         listener.until(lambda: len(listener.of("imu")) > 20, "some seconds of samples")
     batches = listener.of("imu")
     numbers = one.numbers(batches)

@@ -21,6 +21,12 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--id", default="gateway", help="names the service and its clock")
     parser.add_argument("--bind", default="127.0.0.1", help="address of one interface")
     parser.add_argument("--port", type=port_or_any, default=8765, help="0 takes any free one")
+    parser.add_argument(
+        "--discovery-port",
+        type=port_or_any,
+        default=8766,
+        help="UDP: nodes that do not know this address find it here; 0: they do not",
+    )
     parser.add_argument("--site", type=Path, metavar="FILE.toml", help="the nodes of this site file may join")
     parser.add_argument(
         "--join-token-sha256",
@@ -54,6 +60,7 @@ def run(args: argparse.Namespace) -> int:
         id=args.id,
         bind=args.bind,
         port=args.port,
+        discovery_port=args.discovery_port or None,
         nodes=_entries(args.site),
         join_token_sha256=args.join_token_sha256,
         calibrations=args.calibrations,

@@ -2,31 +2,19 @@
 
 import asyncio
 import gc
-import json
 import os
 import random
 import struct
+import sys
 import time
 
 from message_pack import Writer, read_map
-from web_socket import ROOM, Unauthorized, WebSocket
+from web_socket import ROOM
 
-FIRMWARE = "brachium 0.1"
-CALIBRATION = "calibration.json"  # looked at before each hello
 _STALLED_MS = 5000  # a message that does not go out, or a gateway that does not ask for the clock
 _LOOK_MS = 250
 _FIRST_PAUSE_MS = 500
 _STEADY_MS = 10000
-
-
-def calibration():
-    """Return the calibration that is kept on the node, {} when there is none or it cannot be read."""
-    try:
-        with open(CALIBRATION) as file:
-            kept = json.load(file)
-        return kept if isinstance(kept, dict) else {}
-    except (OSError, ValueError):
-        return {}
 
 
 class Refused(OSError):
@@ -82,8 +70,6 @@ class Node:
             except Refused as refused:
                 print("refused:", refused)
                 wait = longest if refused.wait_s is None else int(refused.wait_s * 1000)
-            except Unauthorized as error:
-                print(error)
             except (OSError, EOFError, ValueError, asyncio.TimeoutError) as error:
                 print("no connection:", repr(error))
             gc.collect()
@@ -95,24 +81,21 @@ class Node:
             pause = min(2 * pause, longest)
 
     async def _converse(self):
-        about = self._about
         await self._wifi.join()
-        url = about["gateway"]
-        if not url:
-            seek = about["discovery"]
-            import discovery
+        import joining
 
-            url = await discovery.discover(about["id"], about["token"], seek["address"], seek["port"])
-        link = await WebSocket.open(url, about["token"], self._writer, _STALLED_MS // 1000)
+        link, message = await joining.join(self._about, self._sensor, self._boot, self._writer)
+        joining = None
+        for name in ("joining", "discovery"):
+            sys.modules.pop(name, None)
         tasks = ()
         try:
-            await link.send(self._hello)
-            welcome = read_map(await asyncio.wait_for(link.receive(), _STALLED_MS // 1000))
-            if welcome.get("m") == "refused/1":
-                raise Refused(welcome)
-            if welcome.get("m") != "welcome/1":
-                raise OSError("a gateway says welcome, not %r" % welcome.get("m"))
-            print("joined", url, "as", welcome.get("seg"), "of", welcome.get("sub"))
+            said = read_map(message)
+            if said.get("m") == "refused/1":
+                raise Refused(said)
+            if said.get("m") != "welcome/1":
+                raise OSError("a gateway says welcome, not %r" % said.get("m"))
+            print("joined as", said.get("seg"), "of", said.get("sub"))
             self._link, self._heard = link, time.ticks_ms()
             self._batches.keeping = self._batches.connected = True
             tasks = [asyncio.create_task(work(link)) for work in (self._send, self._receive, self._tell)]
@@ -189,30 +172,6 @@ class Node:
                 await asyncio.wait_for(link.receive(), 2)
         except (OSError, EOFError, asyncio.TimeoutError):
             pass
-
-    def _hello(self, writer):
-        about, driver, kept = self._about, self._sensor.driver, calibration()
-        fields = 7 + driver.magnetometer + driver.big_endian + bool(kept)
-        writer.begin(fields, "hello/1")
-        writer.text("id", about["id"])
-        writer.whole("boot", self._boot)
-        writer.text("chip", driver.chip)
-        writer.real("rate", self._sensor.rate_hz)
-        writer.text("fw", FIRMWARE)
-        writer.text("org", about["origin"])
-        if driver.magnetometer:
-            writer.yes("mag")
-        if driver.big_endian:
-            writer.yes("be")
-        if kept:
-            writer.group("cal", len(kept))
-            for name, values in kept.items():
-                writer.reals(name, values)
-        writer.group("sc", 3 if driver.magnetometer else 2)
-        writer.reals("acc", (driver.acc_step,) * 3)
-        writer.reals("gyr", (driver.gyr_step,) * 3)
-        if driver.magnetometer:
-            writer.reals("mag", driver.mag_step)
 
     def _clock_answer(self, writer, number, came):
         writer.begin(3, "clock/1")

@@ -1,19 +1,12 @@
 """A WebSocket to the gateway (RFC 6455): binary messages, masked in place, from one writer at a time."""
 
 import asyncio
-import binascii
-import hashlib
 import os
 import struct
 import time
 
 ROOM = 8  # a header of 4 bytes and the mask
 LONGEST = 1024  # no message of a gateway is longer
-_GUID = b"258EAFA5-E914-47DA-95CA-C5AB0DC85B11"
-
-
-class Unauthorized(OSError):
-    """The gateway does not know the token."""
 
 
 def _mask(data, first, end, key):
@@ -24,17 +17,6 @@ def _mask(data, first, end, key):
     data[first:end] = (said ^ with_key).to_bytes(size, "little")
 
 
-def address_of(url):
-    """Return host, port and path of ws://host:port/path, or raise ValueError."""
-    if not url.startswith("ws://"):
-        raise ValueError("no gateway's address: %r" % url)
-    place, _, path = url[5:].partition("/")
-    host, _, port = place.rpartition(":")
-    if not host:
-        host, port = place, "80"
-    return host, int(port), "/" + path
-
-
 class WebSocket:
     """One open connection. `writer` is the memory in which every message is made."""
 
@@ -42,18 +24,6 @@ class WebSocket:
         self._reader, self._stream, self._writer = reader, stream, writer
         self._lock = asyncio.Lock()  # two tasks in one stream's drain lose or repeat bytes
         self._sending = None
-
-    @classmethod
-    async def open(cls, url, token, writer, within_s):
-        """Connect and shake hands. Raises OSError, of which Unauthorized is one, or TimeoutError."""
-        host, port, path = address_of(url)
-        reader, stream = await asyncio.wait_for(asyncio.open_connection(host, port), within_s)
-        try:
-            await asyncio.wait_for(_handshake(reader, stream, host, port, path, token), within_s)
-        except BaseException:
-            stream.close()
-            raise
-        return cls(reader, stream, writer)
 
     async def send(self, fill, *about, kind=2):
         """Have `fill(writer, *about)` make a message and send it."""
@@ -108,33 +78,3 @@ class WebSocket:
 def _copy(writer, data):
     writer.end = writer.room + len(data)
     writer.buffer[writer.room : writer.end] = data
-
-
-async def _handshake(reader, stream, host, port, path, token):
-    try:
-        stream.s.setsockopt(6, 1, 1)  # TCP_NODELAY: clock answers must not wait for acknowledgements
-    except (AttributeError, OSError):
-        pass
-    key = binascii.b2a_base64(os.urandom(16)).strip()
-    stream.write(
-        "GET %s HTTP/1.1\r\nHost: %s:%d\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
-        "Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: %s\r\nAuthorization: Bearer %s\r\n\r\n"
-        % (path, host, port, key.decode(), token)
-    )
-    await stream.drain()
-    status = await reader.readline()
-    if b" 401" in status:
-        raise Unauthorized("the gateway does not know this node's token")
-    if b" 101" not in status:
-        raise OSError("no gateway answers there: %r" % status[:40])
-    expected = binascii.b2a_base64(hashlib.sha1(key + _GUID).digest()).strip()
-    agreed = False
-    while True:
-        line = (await reader.readline()).strip()
-        if not line:
-            break
-        name, _, value = line.partition(b":")
-        if name.lower() == b"sec-websocket-accept":
-            agreed = value.strip() == expected
-    if not agreed:
-        raise OSError("no WebSocket answers there")
