@@ -8,7 +8,7 @@ from types import ModuleType
 import pytest
 
 from brachium.evaluation.catalogue import CATALOGUE
-from brachium.promises import ACCURACY
+from brachium.promises import ACCURACY, AT_LEVEL
 
 ROOT = Path(__file__).parents[2]
 if not (ROOT / "docs" / "accuracy.md").exists():
@@ -33,6 +33,6 @@ def test_the_page_is_as_the_figures_say():
 
 
 def test_every_table_is_promised_once_and_every_proof_has_its_place():
-    promised = [table for tables in ACCURACY.values() for table in tables]
+    promised = [table for name, tables in ACCURACY.items() for table in tables if name not in AT_LEVEL]
     assert sorted(promised) == sorted(entry.name for entry in CATALOGUE)
     assert re.findall(r"<!-- tables ([a-z-]+) -->", PAGE) == list(ACCURACY)
