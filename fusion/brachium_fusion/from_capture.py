@@ -27,8 +27,8 @@ ZERO_NS = 1_000_000_000_000_000
 """Host time given to t = 0 of a capture, so that times are positive whatever its t."""
 BATCH = 16
 FREE_S = 120.0
-"""Where only movement can tell the headings, all of it up to so long after the pose is used beside what is
-stated: led movements of a still upper arm leave the flexion axis and the heading open."""
+"""Where movements are led, or only movement can tell the headings, all of it up to so long after the pose is
+used beside what is stated: led movements of a still upper arm leave the flexion axis and the heading open."""
 
 
 def nanoseconds(t: npt.ArrayLike) -> npt.NDArray[np.int64]:
@@ -199,7 +199,7 @@ def _alignment(capture: Capture, settings: Settings) -> Alignment | None:
     spans = _timed(capture)
     if not any(span.kind in POSES for span in spans):
         return None
-    if _loose(capture) and not any(span.kind == "free" for span in spans):
+    if (len(spans) > 1 or _loose(capture)) and not any(span.kind == "free" for span in spans):
         spans += (TimedSpan(kind="free", from_s=spans[0].to_s, to_s=spans[0].to_s + FREE_S),)
     subject = Subject(replace(settings, joints=False), lambda _: None)
     times = output_times(capture, None)
