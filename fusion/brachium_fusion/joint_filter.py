@@ -8,9 +8,9 @@ import numpy as np
 
 from brachium_body import rotation
 from brachium_fusion.joint_heading import CERTAIN_SD, HeadingSearch, centre_acceleration
+from brachium_fusion.joint_matrices import Floats, Quaternion, matrix_of, product, quaternion_of, turn
 from brachium_fusion.joint_model import (
     NODE_S,
-    Floats,
     Interval,
     Joint,
     JointState,
@@ -18,7 +18,6 @@ from brachium_fusion.joint_model import (
     heading_sd,
     in_given_world,
     resume,
-    step_of,
 )
 from brachium_fusion.joint_update import SHARED_HEADING_SD, advance, constrain
 
@@ -31,7 +30,7 @@ JUMP = radians(10.0)
 AWAY = radians(45.0)
 OVERTHROWN = 20.0
 """The filter gives up its heading for one this far away with this much more evidence (natural logarithm)."""
-_UNTURNED: Floats = np.array([rotation.IDENTITY, rotation.IDENTITY])
+_UNTURNED: Quaternion = (1.0, 0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -69,11 +68,11 @@ class JointFilter:
         self._search = HeadingSearch(joint)
         self._model: JointState | None = None
         self._tracking = False
-        self._samples: list[tuple[Floats, Floats, Floats]] = []
-        """Turns since the last node, rates and specific forces, from it on."""
+        self._samples: list[tuple[list[Quaternion], Floats, Floats]] = []
+        """Turns since the last node, rates (2, 3) and specific forces (2, 3), from it on."""
         self._node: Floats | None = None
-        """Given orientations at the last node."""
-        self._attitude: Floats = _UNTURNED
+        """Given orientations (2, 3, 3) at the last node."""
+        self._attitude: list[Quaternion] = [_UNTURNED, _UNTURNED]
         """The model's at the last node, in the given world."""
         self._heading, self._heading_sd, self._residual = 0.0, pi, 0.0
 
@@ -89,22 +88,25 @@ class JointFilter:
     ) -> JointEstimate:
         """Take one sample of both: orientations (4,) by each sensor's own filter, rad/s and m/s^2 in sensor
         axes, and for how long before it samples were missing."""
-        given = np.array([world_from_a, world_from_b])
         gyr, acc = np.array([gyr_a, gyr_b]), np.array([acc_a, acc_b])
         if self._node is None or missing_s > 0.0:
+            given = matrix_of(np.array([world_from_a, world_from_b]))
             self._begin(given, gyr, missing_s)
-            self._node, self._samples = given, [(_UNTURNED, gyr, acc)]
+            self._node, self._samples = given, [([_UNTURNED, _UNTURNED], gyr, acc)]
         else:
-            turn, gyr_before, _ = self._samples[-1]
-            turn = rotation.multiply(turn, step_of(gyr_before, gyr, self._period))
-            self._samples.append((turn, gyr, acc))
+            turns, gyr_before, _ = self._samples[-1]
+            steps = (0.5 * self._period * (gyr_before + gyr)).tolist()
+            turns = [product(before, turn(*step)) for before, step in zip(turns, steps, strict=True)]
+            self._samples.append((turns, gyr, acc))
             if len(self._samples) > self._every:
+                given = matrix_of(np.array([world_from_a, world_from_b]))
                 self._reach_node(self._node, given)
-                self._node, self._samples = given, [(_UNTURNED, gyr, acc)]
+                self._node, self._samples = given, [([_UNTURNED, _UNTURNED], gyr, acc)]
         if not self._tracking:
-            return JointEstimate(given[0], given[1], 0.0, pi, self._residual)
-        a, b = rotation.multiply(self._attitude, self._samples[-1][0])
-        return JointEstimate(a, b, self._heading, self._heading_sd, self._residual)
+            return JointEstimate(world_from_a, world_from_b, 0.0, pi, self._residual)
+        turn_a, turn_b = self._samples[-1][0]
+        a, b = product(self._attitude[0], turn_a), product(self._attitude[1], turn_b)
+        return JointEstimate(np.array(a), np.array(b), self._heading, self._heading_sd, self._residual)
 
     def _begin(self, given: Floats, gyr: Floats, missing_s: float) -> None:
         """Begin, or go on behind a gap: the sensors' own filters tell how they lie now."""
@@ -120,14 +122,20 @@ class JointFilter:
 
     def _track(self, given: Floats, gyr: Floats, heading: float, sd: float) -> None:
         """Begin linear estimation at a heading."""
-        turned = np.array([given[0], rotation.multiply(rotation.about(2, heading), given[1])])
-        self._attitude = turned
+        turned = given.copy()
+        turned[1] = matrix_of(rotation.about(2, heading)) @ given[1]
+        self._stand_at(turned)
         self._heading, self._heading_sd = heading, sd
         if self._model is None:
             self._model = begin(self._joint, turned, gyr, sd)
         else:
             self._model = resume(self._joint, self._model, turned, gyr, sd)
         self._tracking = self._joint.has_axes or self._joint.has_levers
+
+    def _stand_at(self, attitude: Floats, heading: float = 0.0) -> None:
+        """Have both at attitudes (2, 3, 3) turned about the vertical."""
+        up = turn(0.0, 0.0, heading)
+        self._attitude = [product(up, quaternion_of(one)) for one in attitude]
 
     def _reach_node(self, given_before: Floats, given: Floats) -> None:
         turns, rates, forces = (np.array(values) for values in zip(*self._samples, strict=True))
@@ -139,7 +147,8 @@ class JointFilter:
             shared = self._heading if self._shared else None
             self._residual = constrain(self._model, self._joint, gyr, shared)
             self._heading_sd = heading_sd(self._model.covariance)
-            self._attitude, heading = in_given_world(self._model.attitude, given, self._shared)
+            common, heading = in_given_world(self._model.attitude, given, self._shared)
+            self._stand_at(self._model.attitude, float(common))
             before, self._heading = self._heading, float(heading)
             if abs(float(rotation.wrap(self._heading - before))) > JUMP:
                 self._search = HeadingSearch(self._joint)  # a given heading is another one than before
@@ -159,20 +168,28 @@ class JointFilter:
         model = self._model
         return {
             "search": self._search.state(),
-            "samples": [[values.tolist() for values in sample] for sample in self._samples],
+            "samples": [[[list(q) for q in t], g.tolist(), a.tolist()] for t, g, a in self._samples],
             "model": None if model is None else model.state(),
             "tracking": self._tracking,
             "node": None if self._node is None else self._node.tolist(),
-            "attitude": self._attitude.tolist(),
+            "attitude": [list(q) for q in self._attitude],
             "numbers": [self._heading, self._heading_sd, self._residual],
         }
 
     def restore(self, state: dict[str, Any]) -> None:
         """Go on as the filter whose state this is would have."""
         self._search.restore(state["search"])
-        self._samples = [(np.array(t), np.array(g), np.array(a)) for t, g, a in state["samples"]]
+        self._samples = [
+            ([_quaternion(q) for q in turns], np.array(gyr), np.array(acc))
+            for turns, gyr, acc in state["samples"]
+        ]
         self._tracking, model, node = state["tracking"], state["model"], state["node"]
         self._model = None if model is None else JointState.of(model)
         self._node = None if node is None else np.array(node)
-        self._attitude = np.array(state["attitude"])
+        self._attitude = [_quaternion(q) for q in state["attitude"]]
         self._heading, self._heading_sd, self._residual = state["numbers"]
+
+
+def _quaternion(values: list[float]) -> Quaternion:
+    w, x, y, z = values
+    return w, x, y, z

@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from brachium_body import rotation
-from brachium_fusion.joint_model import Floats, Interval, Joint
+from brachium_fusion.joint_matrices import Floats, skew
+from brachium_fusion.joint_model import Interval, Joint
 from brachium_fusion.joint_update import GRAVITY
 
 HEADINGS = 72
@@ -34,18 +34,22 @@ CERTAIN_SD = 0.26
 """rad: 15 deg, within which linear estimation takes over."""
 
 
+_ANGLES: Floats = np.arange(HEADINGS) * (2.0 * pi / HEADINGS) - pi
+_TERMS: Floats = np.stack([np.cos(_ANGLES), np.sin(_ANGLES), np.ones(HEADINGS)])
+_COSINES, _SINES, _ = _TERMS
+
+
 class HeadingSearch:
     """Gathers evidence on the heading of sensor b to sensor a; old evidence fades."""
 
     def __init__(self, joint: Joint, forget_s: float = FORGET_S) -> None:
         self._joint, self._forget_s = joint, forget_s
-        self._angles = np.arange(HEADINGS) * (2.0 * pi / HEADINGS) - pi
-        self._cosines, self._sines = np.cos(self._angles), np.sin(self._angles)
         self.likelihood: Floats = np.zeros(HEADINGS)
 
     def take(self, attitude: Floats, rate: Floats, acceleration: Floats, span_s: float) -> None:
-        """Take what both sensors saw over `span_s`: world_from_sensor (2, 4), each with its own heading; rate
-        (2, 3) rad/s in sensor axes; acceleration (2, 3) of the joint centre in each one's world, m/s^2."""
+        """Take what both sensors saw over `span_s`: world_from_sensor (2, 3, 3), each with its own heading;
+        rate (2, 3) rad/s in sensor axes; acceleration (2, 3) of the joint centre in each one's world, m/s^2.
+        """
         weight = min(1.0, span_s / ALIKE_S)
         self.likelihood = self.likelihood * (1.0 - span_s / self._forget_s)
         if self._joint.has_levers:
@@ -53,42 +57,40 @@ class HeadingSearch:
             if min(ax * ax + ay * ay, bx * bx + by * by) > LEAST_ACCELERATION**2:
                 along, across = ax * bx + ay * by, ay * bx - ax * by
                 gain = weight / max(ACCELERATION_SD**2, hypot(along, across) / MOST_EVIDENCE)
-                self.likelihood += gain * (along * self._cosines + across * self._sines)
+                self.likelihood += np.array([gain * along, gain * across, 0.0]) @ _TERMS
         if self._joint.has_axes:
-            self.likelihood += weight * self._axes(attitude, rotation.rotate(attitude, rate))
+            self.likelihood += weight * self._axes(attitude, rate)
 
     def _axes(self, attitude: Floats, rate: Floats) -> Floats:
+        """Return the evidence (72,) of the axes, made of products of vectors of a with turned ones of b."""
         joint = self._joint
         assert joint.axis_a is not None
         assert joint.axis_b is not None
-        a = rotation.rotate(attitude[0], joint.axis_a)
-        b = self._turned(rotation.rotate(attitude[1], joint.axis_b))
-        difference = self._turned(rate[1]) - rate[0]
+        a, b = attitude[0] @ joint.axis_a, attitude[1] @ joint.axis_b
+        rate_a, rate_b = (attitude @ rate[:, :, None])[:, :, 0]
         if joint.axes == 1:
-            off = np.linalg.norm(np.cross(a, difference), axis=1)
-            bend = np.linalg.norm(b - a, axis=1)
+            # of d = rate_b - rate_a: |a x d|^2 = |d|^2 - (a d)^2
+            products = np.array([_turning(rate_a, rate_b), _turning(a, rate_b), _turning(a, b)]) @ _TERMS
+            along = products[1] - float(a @ rate_a)
+            off = float(rate_b @ rate_b + rate_a @ rate_a) - 2.0 * products[0] - along * along
+            bend = 2.0 - 2.0 * products[2]
         else:
-            normal = np.cross(a, b)
-            length = np.maximum(np.linalg.norm(normal, axis=1), 0.3)
-            off = np.einsum("ni,ni->n", normal, difference) / length
-            bend = b @ a - sin(joint.carrying_rad)
-        found: Floats = -0.5 * ((off / RATE_SD) ** 2 + (bend / ANGLE_SD) ** 2)
+            # normal a x b: its product with rate_b is a (b x rate_b), with rate_a (rate_a x a) b
+            across = _turning(a, skew(b) @ rate_b)
+            against = _turning(skew(rate_a) @ a, b)
+            dot, along = (
+                np.array([_turning(a, b), [x - y for x, y in zip(across, against, strict=True)]]) @ _TERMS
+            )
+            off = along * along / np.maximum(1.0 - dot * dot, 0.09)
+            bend = (dot - sin(joint.carrying_rad)) ** 2
+        found: Floats = -0.5 * (off / RATE_SD**2 + bend / ANGLE_SD**2)
         return found
-
-    def _turned(self, v: Floats) -> Floats:
-        """Return v (3,) turned about the vertical by every heading, (72, 3)."""
-        x, y, z = v.tolist()
-        turned = np.empty((HEADINGS, 3))
-        turned[:, 0] = self._cosines * x - self._sines * y
-        turned[:, 1] = self._sines * x + self._cosines * y
-        turned[:, 2] = z
-        return turned
 
     def best(self) -> tuple[float, float]:
         """Return the heading, rad, to turn b by from the left, and its standard deviation, at most pi."""
         odds = np.exp(self.likelihood - self.likelihood.max())
         odds /= odds.sum()
-        x, y = float(odds @ self._cosines), float(odds @ self._sines)
+        x, y = float(odds @ _COSINES), float(odds @ _SINES)
         length = min(1.0, np.hypot(x, y))
         if length < 1e-3:
             return 0.0, pi
@@ -114,14 +116,19 @@ class HeadingSearch:
         self.likelihood = np.array(state["likelihood"])
 
 
+def _turning(u: Floats, v: Floats) -> list[float]:
+    """Return the product of u (3,) with v (3,) turned about the vertical: of its cosine, its sine, one."""
+    (ux, uy, uz), (vx, vy, vz) = u.tolist(), v.tolist()
+    return [ux * vx + uy * vy, uy * vx - ux * vy, uz * vz]
+
+
 def centre_acceleration(
     joint: Joint, interval: Interval, start: Floats, end: Floats, rate_start: Floats, rate_end: Floats
 ) -> Floats:
     """Return the joint centre's mean acceleration (..., 2, 3) over an interval as each sensor saw it, each in
-    its own world: from world_from_sensor (..., 2, 4) and rates (..., 2, 3) at both ends."""
-    lever = np.array([np.zeros(3) if v is None else v for v in (joint.lever_a, joint.lever_b)])
-    arm_start = rotation.rotate(start, np.cross(rate_start, lever))
-    gained = rotation.rotate(end, np.cross(rate_end, lever)) - arm_start
-    acceleration = (rotation.rotate(start, interval.push) + gained) / interval.span_s
+    its own world: from world_from_sensor (..., 2, 3, 3) and rates (..., 2, 3) at both ends."""
+    lever = skew(np.array([np.zeros(3) if v is None else v for v in (joint.lever_a, joint.lever_b)]))
+    gained = start @ (lever @ rate_start[..., None]) - end @ (lever @ rate_end[..., None])
+    acceleration: Floats = ((start @ interval.push[..., None] + gained) / interval.span_s)[..., 0]
     acceleration[..., 2] -= GRAVITY
     return acceleration

@@ -14,15 +14,12 @@ gyroscope bias (rad/s), accelerometer bias (m/s^2), lever arm (m); attitude_true
 """
 
 from dataclasses import dataclass
-from math import pi, radians
+from math import pi, radians, sqrt
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-from brachium_body import rotation
-
-Floats = npt.NDArray[np.float64]
+from brachium_fusion.joint_matrices import Floats, headings, matrix_of, skew, turn_by, vector_of
 
 NODE_S = 0.08
 """Constraints are applied this often: twice as often as the arm's fastest movements need."""
@@ -82,7 +79,9 @@ class Interval:
     may have further leading axes: many intervals, gathered at once."""
 
     turn: Floats
-    """(..., 2, 4) start_from_end by the gyroscopes as they read."""
+    """(..., 2, 3, 3) start_from_end by the gyroscopes as they read."""
+    angle: Floats
+    """(..., 2) rad: how far that turns."""
     spread: Floats
     """(..., 2, 3, 3) s: the integral of start_from_now."""
     push: Floats
@@ -95,18 +94,32 @@ class Interval:
     def gather(turns: Floats, gyr: Floats, acc: Floats, period_s: float) -> "Interval":
         """Return what samples (..., k + 1, 2, 3), rad/s and m/s^2, from one node to the next add up to;
         `turns` (..., k + 1, 2, 4) are the rotations start_from_sample."""
-        matrix = rotation.to_matrix(turns)
-        weight = np.full(gyr.shape[-3], period_s)
+        matrix = matrix_of(turns)
+        count = gyr.shape[-3]
+        weight = np.full(count, period_s)
         weight[[0, -1]] = 0.5 * period_s
-        push = np.einsum("k,...ksij,...ksj->...si", weight, matrix, acc)
+        lead = gyr.shape[:-3]
+        push = weight @ (matrix @ acc[..., None]).reshape(*lead, count, 6)
+        spread = weight @ matrix.reshape(*lead, count, 18)
         squared = np.einsum("...i,...i->...", gyr, gyr).max(axis=-1) @ weight
-        spread = np.einsum("k,...ksij->...sij", weight, matrix)
-        return Interval(turns[..., -1, :, :], spread, push, squared, period_s * (len(weight) - 1))
+        return Interval(
+            matrix[..., -1, :, :, :],
+            2.0 * np.arccos(np.minimum(np.abs(turns[..., -1, :, 0]), 1.0)),
+            spread.reshape(*lead, 2, 3, 3),
+            push.reshape(*lead, 2, 3),
+            squared,
+            period_s * (count - 1),
+        )
 
     def at(self, index: int | slice) -> "Interval":
         """Return one of many intervals, or some."""
         return Interval(
-            self.turn[index], self.spread[index], self.push[index], self.squared[index], self.span_s
+            self.turn[index],
+            self.angle[index],
+            self.spread[index],
+            self.push[index],
+            self.squared[index],
+            self.span_s,
         )
 
 
@@ -115,35 +128,52 @@ class JointState:
     """Both sensors' motion and errors, and their covariance."""
 
     attitude: Floats
-    """(2, 4) world_from_sensor."""
-    velocity: Floats
-    """(2, 3) m/s of the sensors, in the world."""
-    gyro_bias: Floats
-    acc_bias: Floats
-    lever: Floats
+    """(2, 3, 3) world_from_sensor."""
+    others: Floats
+    """(2, 12): velocity of the sensor in the world, m/s, and what is learnt of it: gyroscope bias,
+    accelerometer bias, lever arm."""
     covariance: Floats
     """(30, 30)."""
-    noise: Floats
-    """(2,) learnt factors of the variances of noise: of walks and agreement, of axes."""
-    still_s: Floats
-    """(2,) s for how long each sensor has been at rest."""
+    noise: tuple[float, float]
+    """Learnt factors of the variances of noise: of walks and agreement, of axes."""
+    still_s: tuple[float, float]
+    """For how long each sensor has been at rest."""
+
+    @property
+    def velocity(self) -> Floats:
+        """(2, 3) m/s."""
+        return self.others[:, 0:3]
+
+    @property
+    def gyro_bias(self) -> Floats:
+        """(2, 3) rad/s."""
+        return self.others[:, 3:6]
+
+    @property
+    def acc_bias(self) -> Floats:
+        """(2, 3) m/s^2."""
+        return self.others[:, 6:9]
+
+    @property
+    def lever(self) -> Floats:
+        """(2, 3) m."""
+        return self.others[:, 9:12]
 
     def copy(self) -> "JointState":
-        """Return another with the same values."""
-        return JointState(*(array.copy() for array in self._arrays()))
+        """Return another with the same values; arrays are replaced, never written to."""
+        return JointState(self.attitude, self.others, self.covariance, self.noise, self.still_s)
 
     def state(self) -> list[Any]:
         """Return all as plain values."""
-        return [array.tolist() for array in self._arrays()]
+        arrays = self.attitude, self.others, self.covariance
+        return [*(array.tolist() for array in arrays), list(self.noise), list(self.still_s)]
 
     @staticmethod
     def of(state: list[Any]) -> "JointState":
         """Return what has this state."""
-        return JointState(*(np.array(values) for values in state))
-
-    def _arrays(self) -> tuple[Floats, ...]:
-        known = self.attitude, self.velocity, self.gyro_bias, self.acc_bias, self.lever
-        return *known, self.covariance, self.noise, self.still_s
+        arrays = (np.array(values) for values in state[:3])
+        (walks, axes), (still_a, still_b) = state[3:]
+        return JointState(*arrays, (walks, axes), (still_a, still_b))
 
 
 BLOCK = 15
@@ -151,7 +181,7 @@ _LEARNT = np.concatenate([np.arange(6, BLOCK), np.arange(BLOCK + 6, 2 * BLOCK)])
 
 
 def begin(joint: Joint, attitude: Floats, gyr: Floats, heading_sd: float) -> JointState:
-    """Return the state at attitudes (2, 4), the heading between them known to `heading_sd` rad."""
+    """Return the state at attitudes (2, 3, 3), the heading between them known to `heading_sd` rad."""
     lever = np.zeros((2, 3))
     deviation = np.empty((2, BLOCK))
     for i, known in enumerate((joint.lever_a, joint.lever_b)):
@@ -161,69 +191,56 @@ def begin(joint: Joint, attitude: Floats, gyr: Floats, heading_sd: float) -> Joi
             [TILT_SD, SPEED_SD, GYRO_BIAS_SD, ACC_BIAS_SD, UNKNOWN_LEVER_SD if known is None else LEVER_SD], 3
         )
     deviation[0, 2], deviation[1, 2] = 1e-4, heading_sd
-    matrix = rotation.to_matrix(attitude)
-    velocity = -np.einsum("sij,sj->si", matrix, np.cross(gyr, lever))  # the joint centre rests
+    others = np.zeros((2, 12))
+    others[:, 0:3] = _velocity_at_rest(attitude, gyr, lever)
+    others[:, 9:12] = lever
     covariance = np.diag(deviation.ravel() ** 2)
-    no_bias = np.zeros((2, 3))
-    return JointState(
-        attitude.copy(), velocity, no_bias, no_bias.copy(), lever, covariance, np.ones(2), np.zeros(2)
-    )
+    return JointState(attitude, others, covariance, (1.0, 1.0), (0.0, 0.0))
 
 
 def resume(joint: Joint, state: JointState, attitude: Floats, gyr: Floats, heading_sd: float) -> JointState:
-    """Return the state begun anew at attitudes (2, 4), with the biases and lever arms that were learnt."""
+    """Return the state begun anew at attitudes (2, 3, 3), with the biases and lever arms that were learnt."""
     new = begin(joint, attitude, gyr, heading_sd)
     kept = _LEARNT[:, None], _LEARNT[None, :]
     new.covariance[kept] = state.covariance[kept]
-    new.gyro_bias, new.acc_bias = state.gyro_bias.copy(), state.acc_bias.copy()
-    new.lever, new.noise = state.lever.copy(), state.noise.copy()
+    new.others[:, 3:] = state.others[:, 3:]
+    new.others[:, 0:3] = _velocity_at_rest(attitude, gyr - state.gyro_bias, state.lever)
+    new.noise = state.noise
     return new
+
+
+def _velocity_at_rest(attitude: Floats, rate: Floats, lever: Floats) -> Floats:
+    """Return the sensors' velocities (2, 3) while the joint centre rests."""
+    moved: Floats = attitude @ (skew(lever) @ rate[:, :, None])
+    return moved[:, :, 0]
 
 
 def add(state: JointState, error: Floats) -> None:
     """Put an error (30,) into the state."""
     e = error.reshape(2, BLOCK)
-    turned = rotation.multiply(rotation.from_rotation_vector(e[:, 0:3]), state.attitude)
-    state.attitude = rotation.normalize(turned)
-    state.velocity = state.velocity + e[:, 3:6]
-    state.gyro_bias = state.gyro_bias + e[:, 6:9]
-    state.acc_bias = state.acc_bias + e[:, 9:12]
-    state.lever = state.lever + e[:, 12:15]
+    state.attitude = turn_by(e[:, 0:3]) @ state.attitude
+    state.others = state.others + e[:, 3:]
 
 
 def difference(to: JointState, of: JointState) -> Floats:
     """Return the error (30,) that takes the state `of` to `to`."""
     e = np.empty((2, BLOCK))
-    e[:, 0:3] = rotation.to_rotation_vector(rotation.multiply(to.attitude, rotation.inverse(of.attitude)))
-    e[:, 3:6] = to.velocity - of.velocity
-    e[:, 6:9] = to.gyro_bias - of.gyro_bias
-    e[:, 9:12] = to.acc_bias - of.acc_bias
-    e[:, 12:15] = to.lever - of.lever
+    e[:, 0:3] = vector_of(to.attitude @ of.attitude.transpose(0, 2, 1))
+    e[:, 3:] = to.others - of.others
     return e.ravel()
 
 
-def attitude_after(attitude: Floats, gyro_bias: Floats, turn: Floats, spread: Floats) -> Floats:
-    """Return world_from_sensor (..., 2, 4) at the end of an interval that began at `attitude`."""
-    drift = (spread @ gyro_bias[..., None])[..., 0]
-    turned = rotation.multiply(rotation.from_rotation_vector(-drift), turn)
-    return rotation.normalize(rotation.multiply(attitude, turned))
-
-
-def step_of(gyr_before: Floats, gyr: Floats, period_s: float) -> Floats:
-    """Return the turn (..., 4) from one sample to the next, of the rates (..., 3) at both."""
-    return rotation.from_rotation_vector((0.5 * period_s) * (gyr_before + gyr))
-
-
 def in_given_world(attitude: Floats, given: Floats, shared: bool) -> tuple[Floats, Floats]:
-    """Return attitudes (..., 2, 4) with the heading of the world of the given ones (..., 2, 4), and b's turn
-    about the vertical to a (...). That world's heading is a's, or the mean of both where they share one."""
-    to_given = rotation.heading(rotation.multiply(given, rotation.inverse(attitude)))
-    heading = rotation.wrap(to_given[..., 0] - to_given[..., 1])
-    common = to_given[..., 0] - (0.5 * heading if shared else 0.0)
-    return rotation.multiply(rotation.about(2, common)[..., None, :], attitude), heading
+    """Return by how much attitudes (..., 2, 3, 3) are to be turned about the vertical (...) to have the
+    heading of the given ones' world (..., 2, 3, 3), and by how much the given b is turned to a (...). That
+    world's heading is a's, or the mean of both where they share one."""
+    to_given = headings(given @ np.swapaxes(attitude, -1, -2))
+    away = to_given[..., 0] - to_given[..., 1]
+    heading = (away + pi) % (2.0 * pi) - pi
+    return to_given[..., 0] - (0.5 * heading if shared else 0.0), heading
 
 
 def heading_sd(covariance: Floats) -> float:
     """Return the standard deviation of b's heading to a's, rad, at most pi."""
-    variance = covariance[2, 2] + covariance[17, 17] - 2.0 * covariance[2, 17]
-    return min(pi, float(np.sqrt(max(variance, 0.0))))
+    variance = float(covariance[2, 2] + covariance[17, 17] - 2.0 * covariance[2, 17])
+    return min(pi, sqrt(max(variance, 0.0)))

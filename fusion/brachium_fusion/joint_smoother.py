@@ -12,9 +12,9 @@ import numpy as np
 
 from brachium_body import rotation
 from brachium_fusion.joint_heading import CERTAIN_SD, HeadingSearch, centre_acceleration
+from brachium_fusion.joint_matrices import Floats, matrix_of
 from brachium_fusion.joint_model import (
     NODE_S,
-    Floats,
     Interval,
     Joint,
     JointState,
@@ -24,13 +24,15 @@ from brachium_fusion.joint_model import (
     heading_sd,
     in_given_world,
     resume,
-    step_of,
 )
 from brachium_fusion.joint_update import SHARED_HEADING_SD, advance, constrain
 
 SEARCH_S = 120.0
 """The heading at the beginning is found from so much of the recording."""
-BLOCK_NODES = 512
+START_NODES = 256
+"""Of which, smoothed once, the tilt at the beginning is taken."""
+BLOCK_NODES = 2048
+"""Of which 45 MB are kept."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -88,7 +90,7 @@ class _Nodes:
     """What was found at the nodes of a part."""
 
     attitude: Floats
-    """(nodes + 1, 2, 4)."""
+    """(nodes + 1, 2, 3, 3)."""
     heading_sd: Floats
     residual: Floats
     first: JointState
@@ -107,7 +109,7 @@ class _Part:
         self.every = max(1, round(NODE_S * rate_hz))
         self.nodes = (len(gyr) - 1) // self.every
         self.at = np.arange(self.nodes + 1) * self.every
-        self.steps = step_of(gyr[:-1], gyr[1:], 1.0 / rate_hz)
+        self.steps = rotation.from_rotation_vector((0.5 / rate_hz) * (gyr[:-1] + gyr[1:]))
         """(n - 1, 2, 4) from each sample to the next."""
         self.turns = np.empty((self.nodes, self.every + 1, 2, 4))
         """start_from_sample of every interval."""
@@ -115,6 +117,8 @@ class _Part:
         for i in range(self.every):
             self.turns[:, i + 1] = rotation.multiply(self.turns[:, i], self.steps[self.at[:-1] + i])
         pieces = self.at[:-1, None] + np.arange(self.every + 1)
+        self.matrices = matrix_of(given[self.at])
+        """World_from_sensor (nodes + 1, 2, 3, 3) as given."""
         self.intervals = Interval.gather(self.turns, gyr[pieces], acc[pieces], 1.0 / rate_hz)
 
     def solve(
@@ -127,17 +131,21 @@ class _Part:
             sd = SHARED_HEADING_SD if self.shared else pi
             n = len(self.gyr)
             return self.given, np.zeros(n), np.full(n, sd), np.full(n, np.nan)
-        first = np.array([self.given[0, 0], rotation.multiply(rotation.about(2, start), self.given[0, 1])])
+        first = matrix_of(self.given[0])
+        first[1] = matrix_of(rotation.about(2, start)) @ first[1]
         if learnt is None:
             state = begin(self.joint, first, self.gyr[0], sd)
         else:
             state = resume(self.joint, learnt, first, self.gyr[0], sd)
         # The tilt given at the beginning may be far off, which one linear step back does not mend.
-        again = self._smooth(state.copy(), min(BLOCK_NODES, self.nodes)).first
-        state.attitude, state.velocity = again.attitude, again.velocity
+        again = self._smooth(state.copy(), min(START_NODES, self.nodes)).first
+        state.attitude = again.attitude
+        state.others = np.concatenate([again.velocity, state.others[:, 3:]], axis=1)
         found = self._smooth(state, self.nodes)
         self.last = state
-        rows, heading = in_given_world(self._all_samples(found.attitude), self.given, self.shared)
+        rows = self._all_samples(rotation.from_matrix(found.attitude))
+        common, heading = in_given_world(matrix_of(rows), matrix_of(self.given), self.shared)
+        rows = rotation.multiply(rotation.about(2, common)[:, None], rows)
         node = np.minimum(np.arange(len(self.gyr)) // self.every, self.nodes)
         return rows, heading, found.heading_sd[node], found.residual[node]
 
@@ -160,7 +168,7 @@ class _Part:
         search = HeadingSearch(self.joint, forget_s=inf)
         count = min(self.nodes, round(SEARCH_S / NODE_S))
         at = self.at[: count + 1]
-        given, rate = self.given[at], self.gyr[at]
+        given, rate = self.matrices[: count + 1], self.gyr[at]
         gathered = self.intervals.at(slice(count))
         acceleration = centre_acceleration(self.joint, gathered, given[:-1], given[1:], rate[:-1], rate[1:])
         for node in range(count):
@@ -169,52 +177,63 @@ class _Part:
             return search.best()[0], CERTAIN_SD
         return 0.0, SHARED_HEADING_SD if self.shared else pi
 
-    def _forward(
-        self, state: JointState, first: int, end: int
-    ) -> Iterator[tuple[Floats, JointState, JointState, float]]:
-        """Yield transition, predicted and corrected state and residual at nodes first + 1 to end."""
+    def _forward(self, state: JointState, first: int, end: int) -> Iterator["_Step"]:
+        """Yield what happens at nodes first + 1 to end; carries the state there in place."""
         for node in range(first, end):
+            before = state.copy()
             transition = advance(state, self.intervals.at(node))
             predicted = state.copy()
             shared = None
             if self.shared:
-                _, away = in_given_world(state.attitude, self.given[self.at[node + 1]], shared=True)
+                _, away = in_given_world(state.attitude, self.matrices[node + 1], shared=True)
                 shared = float(away)
             residual = constrain(state, self.joint, self.gyr[self.at[node + 1]], shared)
-            yield transition, predicted, state.copy(), residual
+            yield _Step(before, transition, predicted, residual)
 
     def _smooth(self, state: JointState, nodes: int) -> "_Nodes":
         """Return what holds at nodes 0 to `nodes`, of the state at node 0, which becomes the last."""
-        begins = list(range(0, nodes, BLOCK_NODES))
-        starts = []
-        for first in begins:
+        blocks = [(first, min(first + BLOCK_NODES, nodes)) for first in range(0, nodes, BLOCK_NODES)]
+        starts, steps = [], list[_Step]()
+        for first, end in blocks:
             starts.append(state.copy())
-            for _ in self._forward(state, first, min(first + BLOCK_NODES, nodes)):
-                pass
+            steps = []
+            for step in self._forward(state, first, end):
+                if end == nodes:  # the way back begins here
+                    steps.append(step)
         smoothed = state
-        attitude, deviation, residual = np.empty((nodes + 1, 2, 4)), np.empty(nodes + 1), np.zeros(nodes + 1)
+        attitude, deviation, residual = (
+            np.empty((nodes + 1, 2, 3, 3)),
+            np.empty(nodes + 1),
+            np.zeros(nodes + 1),
+        )
         attitude[-1], deviation[-1] = state.attitude, heading_sd(state.covariance)
-        for first, start in zip(reversed(begins), reversed(starts), strict=True):
-            end = min(first + BLOCK_NODES, nodes)
-            block = [(np.eye(1), start, start.copy(), 0.0), *self._forward(start.copy(), first, end)]
-            for node in range(end, first - 1, -1):
-                if node < end:
-                    transition, predicted, _, _ = block[node + 1 - first]
-                    _, _, filtered, _ = block[node - first]
-                    smoothed = _back(filtered, transition, predicted, smoothed)
+        for (first, end), start in zip(reversed(blocks), reversed(starts), strict=True):
+            if end < nodes:
+                steps = list(self._forward(start, first, end))
+            for node in range(end - 1, first - 1, -1):
+                step = steps[node - first]
+                smoothed = _back(step, smoothed)
                 attitude[node], deviation[node] = smoothed.attitude, heading_sd(smoothed.covariance)
-                if node > first:
-                    residual[node] = block[node - first][3]
+                residual[node + 1] = step.residual
         return _Nodes(attitude, deviation, residual, smoothed)
 
 
-def _back(
-    filtered: JointState, transition: Floats, predicted: JointState, smoothed: JointState
-) -> JointState:
+@dataclass(frozen=True, slots=True, eq=False)
+class _Step:
+    """From one node to the next, forward."""
+
+    before: JointState
+    transition: Floats
+    predicted: JointState
+    """Before the constraints of the next node."""
+    residual: float
+
+
+def _back(step: _Step, smoothed: JointState) -> JointState:
     """Return the smoothed state before, of the one after (Rauch, Tung, Striebel 1965)."""
-    gain = np.linalg.solve(predicted.covariance, transition @ filtered.covariance).T
-    state = filtered.copy()
-    change = smoothed.covariance - predicted.covariance
-    state.covariance = filtered.covariance + gain @ change @ gain.T
+    covariance, predicted = step.before.covariance, step.predicted
+    gain = np.linalg.solve(predicted.covariance, step.transition @ covariance).T
+    state = step.before.copy()
+    state.covariance = covariance + gain @ (smoothed.covariance - predicted.covariance) @ gain.T
     add(state, gain @ difference(smoothed, predicted))
     return state

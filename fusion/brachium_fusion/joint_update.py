@@ -1,21 +1,11 @@
 """How the state of two sensors on one joint goes on, and what the joint tells about it. Pure."""
 
-from math import radians, sin
+from math import exp, radians, sin, sqrt
 
 import numpy as np
 
-from brachium_body import rotation
-from brachium_fusion.joint_model import (
-    BLOCK,
-    NODE_S,
-    SPEED_SD,
-    Floats,
-    Interval,
-    Joint,
-    JointState,
-    add,
-    attitude_after,
-)
+from brachium_fusion.joint_matrices import Floats, orthonormal, skew, turn_by
+from brachium_fusion.joint_model import BLOCK, NODE_S, SPEED_SD, Interval, Joint, JointState, add
 
 GRAVITY = 9.80665
 
@@ -53,122 +43,147 @@ OUTLIER = 3.0
 """An innovation of more than this many standard deviations is given less weight."""
 
 
-_DIAGONAL = np.arange(2 * BLOCK)
+_SIZE = 2 * BLOCK
+_UNIT: Floats = np.eye(_SIZE)
+_UNITS: Floats = np.broadcast_to(np.eye(3), (2, 3, 3))
 
 
-def skew(v: Floats) -> Floats:
-    """Return the matrices (..., 3, 3) whose product with x is v x x."""
-    s = np.zeros((*v.shape, 3))
-    s[..., 0, 1], s[..., 0, 2], s[..., 1, 2] = -v[..., 2], v[..., 1], -v[..., 0]
-    s[..., 1, 0], s[..., 2, 0], s[..., 2, 1] = v[..., 2], -v[..., 1], v[..., 0]
-    return s
+def _of_both(matrix: Floats) -> Floats:
+    """Return (2, 15, 15), to be written to: what of a matrix (30, 30) belongs to each sensor alone."""
+    part: Floats = np.einsum("sisj->sij", matrix.reshape(2, BLOCK, 2, BLOCK))
+    return part
 
 
 def advance(state: JointState, interval: Interval) -> Floats:
     """Carry the state in place over an interval; return the transition matrix (30, 30) of its error."""
-    matrix = rotation.to_matrix(state.attitude)
     span = interval.span_s
-    drift = np.einsum("sij,sj->si", interval.spread, state.gyro_bias)
-    push = interval.push - 0.5 * np.cross(drift, interval.push)
-    push -= np.einsum("sij,sj->si", interval.spread, state.acc_bias)
-    push = np.einsum("sij,sj->si", matrix, push)
-    state.attitude = attitude_after(state.attitude, state.gyro_bias, interval.turn, interval.spread)
-    state.velocity = state.velocity + push
-    state.velocity[:, 2] -= GRAVITY * span
-    moves = np.linalg.norm(rotation.to_rotation_vector(interval.turn), axis=1) > STILL_RATE * span
-    state.still_s = np.where(moves, 0.0, state.still_s + span)
-    spread = matrix @ interval.spread
-    lean = skew(push)
-    transition = np.eye(2 * BLOCK)
-    for i, at in enumerate((0, BLOCK)):
-        transition[at : at + 3, at + 6 : at + 9] = -spread[i]
-        transition[at + 3 : at + 6, at : at + 3] = -lean[i]
-        transition[at + 3 : at + 6, at + 6 : at + 9] = 0.5 * lean[i] @ spread[i]
-        transition[at + 3 : at + 6, at + 9 : at + 12] = -spread[i]
+    drift, pushed = np.split(
+        interval.spread @ state.others[:, 3:9].reshape(2, 2, 3).swapaxes(1, 2), 2, axis=2
+    )
+    push = interval.push[:, :, None] - pushed
+    push = state.attitude @ (push - 0.5 * (skew(drift[:, :, 0]) @ interval.push[:, :, None]))
+    spread = state.attitude @ interval.spread
+    turned = turn_by(-drift[:, :, 0]) @ interval.turn
+    state.attitude = orthonormal(state.attitude @ turned)
+    state.others = state.others.copy()
+    state.others[:, 0:3] += push[:, :, 0]
+    state.others[:, 2] -= GRAVITY * span
+    still_a, still_b = (interval.angle <= STILL_RATE * span).tolist()
+    state.still_s = (
+        state.still_s[0] + span if still_a else 0.0,
+        state.still_s[1] + span if still_b else 0.0,
+    )
+    lean = skew(push[:, :, 0])
+    transition = _UNIT.copy()
+    each = _of_both(transition)
+    each[:, 0:3, 6:9] = each[:, 3:6, 9:12] = -spread
+    each[:, 3:6, 0:3] = -lean
+    each[:, 3:6, 6:9] = 0.5 * (lean @ spread)
     covariance = transition @ state.covariance @ transition.T
-    turning = ATTITUDE_WALK**2 * span + ATTITUDE_WALK_PER_RATE**2 * float(interval.squared)
-    wobble = float(state.noise[0])
-    walks = [wobble * turning, wobble * VELOCITY_WALK**2 * span]
-    noise = np.repeat([*walks, GYRO_BIAS_WALK**2 * span, ACC_BIAS_WALK**2 * span, 0.0], 3)
-    covariance[_DIAGONAL, _DIAGONAL] += np.concatenate([noise, noise])
+    wobble = state.noise[0]
+    turning = wobble * (ATTITUDE_WALK**2 * span + ATTITUDE_WALK_PER_RATE**2 * float(interval.squared))
+    speed = wobble * VELOCITY_WALK**2 * span
+    walks = [turning, speed, GYRO_BIAS_WALK**2 * span, ACC_BIAS_WALK**2 * span, 0.0] * 2
+    covariance.reshape(-1)[:: _SIZE + 1] += np.repeat(walks, 3)
     state.covariance = covariance
     return transition
+
+
+class _Told:
+    """Rows of equations about the error, gathered to be solved as one."""
+
+    def __init__(self) -> None:
+        self.rows: Floats = np.zeros((19, _SIZE))
+        self.innovation: Floats = np.empty(19)
+        self.variance: Floats = np.empty(19)
+        self.parts: list[slice] = []
+        self.count = 0
+
+    def part(self, count: int, innovation: Floats | float, variance: float) -> Floats:
+        """Add equations that are outliers together; return their rows (count, 2, 15), to be written to."""
+        rows = slice(self.count, self.count + count)
+        self.innovation[rows], self.variance[rows] = innovation, variance
+        self.parts.append(rows)
+        self.count += count
+        return self.rows[rows].reshape(count, 2, BLOCK)
+
+    def solve(self, state: JointState) -> list[float]:
+        """Put it into the state; return each part's length in standard deviations, 1 as expected."""
+        rows, innovation = self.rows[: self.count], self.innovation[: self.count]
+        spread = rows @ state.covariance
+        total = spread @ rows.T
+        diagonal = total.reshape(-1)[:: self.count + 1]
+        diagonal += self.variance[: self.count]
+        lengths = []
+        for part in self.parts:
+            first = part if part.stop - part.start <= 3 else slice(part.start, part.start + 3)
+            apart = innovation[first]
+            far = float(apart @ np.linalg.solve(total[first, first], apart)) / len(apart)
+            lengths.append(sqrt(max(far, 0.0)))
+            if far > OUTLIER**2:
+                diagonal[first] += self.variance[first] * (far / OUTLIER**2 - 1.0)
+        gain = np.linalg.solve(total, spread)
+        covariance = state.covariance - spread.T @ gain
+        state.covariance = 0.5 * (covariance + covariance.T)
+        add(state, innovation @ gain)
+        return lengths
 
 
 def constrain(state: JointState, joint: Joint, gyr: Floats, shared: float | None) -> float:
     """Apply in place what holds at a node: gyr (2, 3) there, `shared` the heading of b to a, rad, by
     magnetometers. Return how far the joint centre's two velocities were apart, in standard deviations."""
-    matrix = rotation.to_matrix(state.attitude)
-    rate = gyr - state.gyro_bias
-    arm = np.einsum("sij,sj->si", matrix, np.cross(rate, state.lever))
-    rows = np.zeros((6, 2 * BLOCK))
-    per_sensor = np.empty((2, 3, BLOCK))
-    per_sensor[:, :, 0:3] = -skew(arm)
-    per_sensor[:, :, 3:6] = np.eye(3)
-    per_sensor[:, :, 6:9] = matrix @ skew(state.lever)
-    per_sensor[:, :, 9:12] = 0.0
-    per_sensor[:, :, 12:15] = matrix @ skew(rate)
-    centre = state.velocity + arm
-    rows[0:3, :BLOCK], rows[0:3, BLOCK:] = per_sensor[0], -per_sensor[1]
-    rows[3:6, :BLOCK], rows[3:6, BLOCK:] = 0.5 * per_sensor[0], 0.5 * per_sensor[1]
-    apart = centre[0] - centre[1]
-    squared = float(np.einsum("si,si->s", rate, rate).max())
-    agree = float(state.noise[0]) * (CENTRE_SD**2 + CENTRE_SD_PER_RATE**2 * squared)
-    noise = np.repeat([agree, SPEED_SD**2 * SPEED_TIME_S / NODE_S], 3)
-    residual = _correct(state, rows, np.concatenate([-apart, -centre.mean(axis=0)]), noise)
-    surprise = np.array([residual, 1.0])
-    for i in np.flatnonzero(state.still_s > STILL_S).tolist():
-        _hold_still(state, gyr, i)
+    told = _Told()
+    _agree(told, state, gyr)
     if joint.has_axes:
-        surprise[1] = _hold_axes(state, joint)
-    learnt = np.exp((np.minimum(surprise**2, OUTLIER**2) - 1.0) * (NODE_S / NOISE_TIME_S))
-    state.noise = np.clip(state.noise * learnt, LEAST_NOISE, MOST_NOISE)
+        _hold_axes(told, state, joint)
+    for i in (0, 1):
+        if state.still_s[i] > STILL_S:  # what the gyroscope of a sensor at rest reads is its bias
+            variance = STILL_SD**2 * STILL_TIME_S / NODE_S
+            told.part(3, gyr[i] - state.gyro_bias[i], variance)[:, i, 6:9] = _UNITS[0]
     if shared is not None:
-        row = np.zeros((1, 2 * BLOCK))
-        row[0, 2], row[0, BLOCK + 2] = -1.0, 1.0
-        variance = SHARED_HEADING_SD**2 * SHARED_HEADING_TIME_S / NODE_S
-        _correct(state, row, np.array([-shared]), np.array([variance]))
-    return residual
+        row = told.part(1, -shared, SHARED_HEADING_SD**2 * SHARED_HEADING_TIME_S / NODE_S)
+        row[0, 0, 2], row[0, 1, 2] = -1.0, 1.0
+    lengths = told.solve(state)
+    walks, axes = state.noise
+    state.noise = _learn(walks, lengths[0]), _learn(axes, lengths[1]) if joint.has_axes else axes
+    return lengths[0]
 
 
-def _hold_still(state: JointState, gyr: Floats, sensor: int) -> None:
-    """What the gyroscope of a sensor at rest reads is its bias."""
-    rows = np.zeros((3, 2 * BLOCK))
-    rows[:, sensor * BLOCK + 6 : sensor * BLOCK + 9] = np.eye(3)
-    _correct(
-        state, rows, gyr[sensor] - state.gyro_bias[sensor], np.full(3, STILL_SD**2 * STILL_TIME_S / NODE_S)
-    )
+def _learn(noise: float, length: float) -> float:
+    """Return a factor of noise, taken nearer to what a residual of this length asks for."""
+    more = (min(length * length, OUTLIER**2) - 1.0) * (NODE_S / NOISE_TIME_S)
+    return min(MOST_NOISE, max(LEAST_NOISE, noise * exp(more)))
 
 
-def _hold_axes(state: JointState, joint: Joint) -> float:
+def _agree(told: _Told, state: JointState, gyr: Floats) -> None:
+    """The joint centre is one, and rests over time."""
+    rate = gyr - state.gyro_bias
+    turning = state.attitude @ skew(rate)
+    arm = (turning @ state.lever[:, :, None])[:, :, 0]
+    per_sensor = np.zeros((2, 3, BLOCK))
+    per_sensor[:, :, 0:3] = -skew(arm)
+    per_sensor[:, :, 3:6] = _UNITS
+    per_sensor[:, :, 6:9] = state.attitude @ skew(state.lever)
+    per_sensor[:, :, 12:15] = turning
+    centre = state.velocity + arm
+    squared = float(np.einsum("si,si->s", rate, rate).max())
+    variance = state.noise[0] * (CENTRE_SD**2 + CENTRE_SD_PER_RATE**2 * squared)
+    rows = told.part(6, np.concatenate([centre[1] - centre[0], -0.5 * (centre[0] + centre[1])]), variance)
+    rows[0:3, 0], rows[0:3, 1] = per_sensor[0], -per_sensor[1]
+    rows[3:6, 0], rows[3:6, 1] = 0.5 * per_sensor[0], 0.5 * per_sensor[1]
+    told.variance[3:6] = SPEED_SD**2 * SPEED_TIME_S / NODE_S
+
+
+def _hold_axes(told: _Told, state: JointState, joint: Joint) -> None:
     """Two axes enclose a constant angle; of a hinge they are one."""
     assert joint.axis_a is not None
     assert joint.axis_b is not None
-    a = rotation.rotate(state.attitude[0], joint.axis_a)
-    b = rotation.rotate(state.attitude[1], joint.axis_b)
-    variance = float(state.noise[1]) * AXIS_SD**2 * AXIS_TIME_S / NODE_S
+    a, b = state.attitude[0] @ joint.axis_a, state.attitude[1] @ joint.axis_b
+    variance = state.noise[1] * AXIS_SD**2 * AXIS_TIME_S / NODE_S
     if joint.axes == 2:
-        row = np.zeros((1, 2 * BLOCK))
-        normal = np.cross(a, b)
-        row[0, 0:3], row[0, BLOCK : BLOCK + 3] = normal, -normal
-        bend = np.array([sin(joint.carrying_rad) - float(a @ b)])
-        return _correct(state, row, bend, np.array([variance]))
-    rows = np.zeros((3, 2 * BLOCK))
-    rows[:, 0:3], rows[:, BLOCK : BLOCK + 3] = -skew(a), skew(b)
-    return _correct(state, rows, b - a, np.full(3, variance))
-
-
-def _correct(state: JointState, rows: Floats, innovation: Floats, variance: Floats) -> float:
-    """Take a measurement whose first three rows may be outliers; return their length, 1 as expected."""
-    spread = rows @ state.covariance
-    total = spread @ rows.T
-    total[np.diag_indices_from(total)] += variance
-    first = min(3, len(innovation))
-    far = float(innovation[:first] @ np.linalg.solve(total[:first, :first], innovation[:first])) / first
-    if far > OUTLIER**2:
-        total[np.arange(first), np.arange(first)] += variance[:first] * (far / OUTLIER**2 - 1.0)
-    gain = np.linalg.solve(total, spread).T
-    covariance = state.covariance - gain @ spread
-    state.covariance = 0.5 * (covariance + covariance.T)
-    add(state, gain @ innovation)
-    return float(np.sqrt(far))
+        row = told.part(1, sin(joint.carrying_rad) - float(a @ b), variance)
+        normal = skew(a) @ b
+        row[0, 0, 0:3], row[0, 1, 0:3] = normal, -normal
+    else:
+        rows = told.part(3, b - a, variance)
+        rows[:, 0, 0:3], rows[:, 1, 0:3] = -skew(a), skew(b)

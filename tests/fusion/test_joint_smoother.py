@@ -14,7 +14,10 @@ from brachium_fusion.joint_smoother import smooth_joint
 
 RATE = 50.0
 DATA = Path(os.environ.get("BRACHIUM_DATA", Path(__file__).parents[3] / "shared" / "data"))
-RECORDINGS = ("1D_02", "1D_03", "2D_01", "2D_03", "3D_01", "3D_03")
+RECORDINGS = ("1D_02", "2D_03", "3D_03")
+"""One of each number of axes."""
+ROWS = 2000
+"""The first 40 s tell enough."""
 
 
 def smooth(motion, angle, joint=None, shared=False, rate=RATE):
@@ -31,8 +34,7 @@ def relative_errors(found, motion):
     return np.degrees(rotation.angle_between(relative, true))
 
 
-@pytest.mark.parametrize("axes", [1, 2, 3])
-@pytest.mark.parametrize("angle", [0.0, np.pi])
+@pytest.mark.parametrize(("axes", "angle"), [(1, np.pi), (2, 0.0), (3, -2.6)])
 def test_the_heading_is_right_from_the_first_sample(pendulum, axes, angle):
     motion = pendulum(axes, 20.0, RATE, seed=axes)
     found = smooth(motion, angle)
@@ -40,14 +42,14 @@ def test_the_heading_is_right_from_the_first_sample(pendulum, axes, angle):
     assert np.max(np.abs(np.degrees(rotation.wrap(found.heading_rad + angle)))) < 0.5
 
 
-@pytest.mark.parametrize(("rate", "most"), [(25.0, 2.0), (100.0, 0.5), (200.0, 0.2)])
+@pytest.mark.parametrize(("rate", "most"), [(25.0, 2.0), (200.0, 0.2)])
 def test_errors_of_exact_readings_vanish_with_the_rate(pendulum, rate, most):
     motion = pendulum(3, 20.0, rate, seed=8)
     assert np.max(relative_errors(smooth(motion, 1.0, rate=rate), motion)) < most
 
 
 def test_looking_back_is_no_worse_than_looking_ahead(pendulum):
-    motion = pendulum(3, 60.0, RATE, seed=9)
+    motion = pendulum(3, 30.0, RATE, seed=9)
     random = np.random.default_rng(0)
     for values, sd in ((motion.gyr_a, 0.01), (motion.gyr_b, 0.01), (motion.acc_a, 0.2), (motion.acc_b, 0.2)):
         values += sd * random.normal(size=values.shape)
@@ -58,30 +60,30 @@ def test_looking_back_is_no_worse_than_looking_ahead(pendulum):
     a, b = np.array([e.world_from_a for e in live]), np.array([e.world_from_b for e in live])
     relative = rotation.multiply(rotation.inverse(a), b)
     true = rotation.multiply(rotation.inverse(motion.world_from_a), motion.world_from_b)
-    ahead = np.degrees(rotation.angle_between(relative, true))[750:]
+    ahead = np.degrees(rotation.angle_between(relative, true))[500:]
     found = smooth(motion, 0.0, joint)
-    back = relative_errors(found, motion)[750:]
+    back = relative_errors(found, motion)[500:]
     assert np.mean(back**2) < np.mean(ahead**2)
-    assert np.mean(found.heading_sd_rad[750:-500]) < np.mean([e.heading_sd_rad for e in live[750:-500]])
+    assert np.mean(found.heading_sd_rad[500:-250]) < np.mean([e.heading_sd_rad for e in live[500:-250]])
     np.testing.assert_allclose(found.heading_sd_rad[-1], live[-1].heading_sd_rad, rtol=0.1)
 
 
 def test_blocks_of_the_forward_pass_join(pendulum, monkeypatch):
-    motion = pendulum(3, 20.0, RATE, seed=3)
+    motion = pendulum(3, 15.0, RATE, seed=3)
     monkeypatch.setattr("brachium_fusion.joint_smoother.BLOCK_NODES", 10_000)
     whole = smooth(motion, 0.4)
-    monkeypatch.setattr("brachium_fusion.joint_smoother.BLOCK_NODES", 249)
+    monkeypatch.setattr("brachium_fusion.joint_smoother.BLOCK_NODES", 99)
     pieces = smooth(motion, 0.4)
     np.testing.assert_allclose(pieces.world_from_b, whole.world_from_b, atol=2e-3)
 
 
 def test_missing_rows_stay_missing_and_both_sides_are_solved(pendulum):
-    motion = pendulum(3, 40.0, RATE, seed=3)
-    motion.gyr_a[900:950] = np.nan
+    motion = pendulum(3, 30.0, RATE, seed=3)
+    motion.gyr_a[700:750] = np.nan
     found = smooth(motion, 1.0)
     missing = np.isnan(found.world_from_b).any(axis=1)
-    assert np.flatnonzero(missing).tolist() == list(range(900, 950))
-    assert np.all(found.heading_sd_rad[900:950] == np.pi)
+    assert np.flatnonzero(missing).tolist() == list(range(700, 750))
+    assert np.all(found.heading_sd_rad[700:750] == np.pi)
     assert np.nanmax(relative_errors(found, motion)) < 1.0
 
 
@@ -102,7 +104,7 @@ def test_without_levers_and_axes_orientations_pass(pendulum):
 
 @pytest.mark.data
 def test_real_recordings_without_any_heading():
-    """Six recordings of two rigid segments, the heading of one turned: degrees RMS at the best lag."""
+    """Recordings of two rigid segments, the heading of one turned: degrees RMS at the best lag."""
     tomllib, table = pytest.importorskip("tomllib"), pytest.importorskip("pyarrow.parquet")
     if not (DATA / "twoseg_1D_02").is_dir():
         pytest.skip(f"no recordings at {DATA}; set BRACHIUM_DATA to their folder")
@@ -123,12 +125,12 @@ def test_real_recordings_without_any_heading():
         sensors, given, true = [], [], []
         for segment in segments:
             gyr, acc = (
-                columns(folder / f"{segment}.parquet", names)
+                columns(folder / f"{segment}.parquet", names)[:ROWS]
                 for names in (("gx", "gy", "gz"), ("ax", "ay", "az"))
             )
             sensors.append((gyr, acc))
             given.append(VQF(1.0 / RATE).updateBatch(gyr, acc)["quat6D"])
-            true.append(columns(folder / "truth.parquet", [f"{segment}_sensor_q{c}" for c in "wxyz"]))
+            true.append(columns(folder / "truth.parquet", [f"{segment}_sensor_q{c}" for c in "wxyz"])[:ROWS])
         given[1] = rotation.multiply(rotation.about(2, 2.0), given[1])
         tracker = JointFilter(joint, RATE)
         streams = *given, sensors[0][0], sensors[1][0], sensors[0][1], sensors[1][1]
@@ -136,8 +138,8 @@ def test_real_recordings_without_any_heading():
         live.append(lagged_rms([e.world_from_a for e in steps], [e.world_from_b for e in steps], true, 750))
         found = smooth_joint(joint, RATE, *sensors, *given)
         best.append(lagged_rms(found.world_from_a, found.world_from_b, true, 0))
-    assert np.mean(live) < 1.77, f"{np.round(live, 2)}; allowed 2.1"
-    assert np.mean(best) < 1.60, f"{np.round(best, 2)}; allowed 1.9"
+    assert np.mean(live) < 1.47, f"{np.round(live, 2)}"
+    assert np.mean(best) < 1.26, f"{np.round(best, 2)}"
 
 
 def lagged_rms(a, b, true, first):
