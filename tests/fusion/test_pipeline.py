@@ -703,7 +703,7 @@ ON_HEADING = [name for name in SHOULDER if name != "isb_elevation"]
 
 def test_angles_that_rest_on_a_heading_are_withheld_when_nothing_kept_it_for_too_long(made) -> None:
     mounting = dict.fromkeys(arm_segments("right"), rotation.IDENTITY)
-    skeletons = run(inertial_messages(made, mounting, seconds=700.0), Settings(rate_hz=5.0))
+    skeletons = run(inertial_messages(made, mounting, seconds=700.0), Settings(filter="vqf", rate_hz=5.0))
     # 2 deg after the pose, then 0.02 deg/s: 15 deg are passed after 650 s
     for skeleton in skeletons[20:]:
         age = (skeleton.time_ns - made.START) * 1e-9 - 3.0
