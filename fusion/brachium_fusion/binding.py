@@ -1,12 +1,12 @@
 """One subject's arms: sensors that share a joint correct one another's orientation at each instant. Pure."""
 
 from collections.abc import Mapping
+from math import cos, sin
 from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from brachium_body import rotation
 from brachium_body.lengths import ArmLengths
 from brachium_body.segments import SIDES, Side, arm_segments
 from brachium_fusion.arm_knowledge import Centres, arm_knowledge
@@ -14,7 +14,7 @@ from brachium_fusion.live_arm import LiveArm
 from brachium_fusion.live_shoulder import RestMean
 from brachium_fusion.pose import Alignment
 from brachium_fusion.strap_slip import Slip
-from brachium_fusion.timeline import Motion, Reading, SensorNow, Shift
+from brachium_fusion.timeline import Motion, Reading, SensorNow, Shift, at_instant
 from brachium_fusion.track import STILL_RAD_S, SegmentTrack
 
 Floats = npt.NDArray[np.float64]
@@ -61,6 +61,8 @@ class Binding:
         motions = self._motions(now, readings, known)
         result, shifts, slips = dict(readings), dict[Side, Shift](), list[Slip]()
         for side, (_, arm) in self._arms.items():
+            if not arm.segments:
+                continue
             sensors = {
                 segment: SensorNow(_turned(known.alignment, segment, readings[segment]), motions[segment])
                 for segment in arm.segments
@@ -75,7 +77,7 @@ class Binding:
             for segment, turned in found.world_from_sensor.items():
                 reading = readings[segment]
                 assert reading is not None
-                q = rotation.multiply(_heading(known.alignment, segment, -1.0), turned)
+                q = _about_up(-_turn(known.alignment, segment), turned)
                 result[segment] = reading._replace(before=q, after=q, fraction=0.0)
         for segment in self._slipped:
             reading = result.get(segment)
@@ -145,10 +147,17 @@ class Binding:
 def _turned(alignment: Alignment | None, segment: str, reading: Reading | None) -> Floats:
     """Return the orientation (4,) at the instant, its heading as the pose set it."""
     assert reading is not None
-    q = rotation.slerp(reading.before, reading.after, reading.fraction)
-    return rotation.multiply(_heading(alignment, segment, 1.0), q)
+    return _about_up(_turn(alignment, segment), at_instant(reading))
 
 
-def _heading(alignment: Alignment | None, segment: str, sign: float) -> Floats:
-    turn = 0.0 if alignment is None else alignment.heading.get(segment, 0.0)
-    return rotation.about(2, sign * turn)
+def _turn(alignment: Alignment | None, segment: str) -> float:
+    return 0.0 if alignment is None else alignment.heading.get(segment, 0.0)
+
+
+def _about_up(angle: float, q: Floats) -> Floats:
+    """Return rotation.multiply(about(2, angle), q) of one rotation (4,), at a tenth of the time."""
+    if angle == 0.0:
+        return q
+    c, s = cos(0.5 * angle), sin(0.5 * angle)
+    w, x, y, z = q.tolist()
+    return np.array([c * w - s * z, c * x - s * y, c * y + s * x, c * z + s * w])

@@ -78,7 +78,9 @@ class LiveArm:
 
     @property
     def segments(self) -> tuple[str, ...]:
-        """Whose samples it wants."""
+        """Whose samples it wants: none when there is nothing to estimate."""
+        if not self._joints and self._shoulder is None:
+            return ()
         trunk = () if self._trunk is None else ("sternum",)
         return (*trunk, self._upper, self._forearm, self._hand)
 

@@ -8,7 +8,7 @@ import numpy.typing as npt
 
 from brachium_body import rotation
 from brachium_fusion.sensor_to_segment import SensorRecord
-from brachium_fusion.timeline import Reading
+from brachium_fusion.timeline import Reading, at_instant
 from brachium_fusion.track import SegmentTrack
 
 Floats = npt.NDArray[np.float64]
@@ -32,7 +32,7 @@ class MotionRecord:
             if reading is None:
                 continue
             row = np.full(_WIDTH, np.nan, dtype=np.float32)
-            row[:4] = rotation.slerp(reading.before, reading.after, reading.fraction)
+            row[:4] = at_instant(reading)
             motion = tracks[segment].timeline.motion_at(now)
             if motion is not None:
                 row[4:7], row[7:] = motion.gyr, motion.acc

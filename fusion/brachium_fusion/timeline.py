@@ -3,6 +3,7 @@
 from bisect import bisect_left
 from collections import deque
 from dataclasses import dataclass
+from math import acos, sin, sqrt
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -22,6 +23,24 @@ class Reading(NamedTuple):
     quality: Quality
     sequence: int
     received_ns: int
+
+
+def at_instant(reading: Reading) -> Floats:
+    """Return the orientation (4,) of one reading: what rotation.slerp gives of arrays, at a tenth of its
+    time."""
+    if reading.fraction == 0.0 or reading.before is reading.after:
+        return reading.before
+    a, b = reading.before.tolist(), reading.after.tolist()
+    dot = a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3]
+    sign = 1.0 if dot >= 0.0 else -1.0
+    angle = acos(min(sign * dot, 1.0))
+    first, second = 1.0 - reading.fraction, sign * reading.fraction
+    if angle > 1e-4:
+        first = sin(first * angle) / sin(angle)
+        second = sign * sin(reading.fraction * angle) / sin(angle)
+    w, x, y, z = (first * p + second * q for p, q in zip(a, b, strict=True))
+    length = sqrt(w * w + x * x + y * y + z * z)
+    return np.array([w / length, x / length, y / length, z / length])
 
 
 class Motion(NamedTuple):
