@@ -34,7 +34,7 @@ CERTAIN_SD = 0.26
 """rad: 15 deg, within which linear estimation takes over."""
 
 
-_ANGLES: Floats = np.arange(HEADINGS) * (2.0 * pi / HEADINGS) - pi
+_ANGLES: Floats = np.linspace(-pi, pi, HEADINGS, endpoint=False)
 _TERMS: Floats = np.stack([np.cos(_ANGLES), np.sin(_ANGLES), np.ones(HEADINGS)])
 _COSINES, _SINES, _ = _TERMS
 

@@ -171,9 +171,9 @@ class JointState:
     @staticmethod
     def of(state: list[Any]) -> "JointState":
         """Return what has this state."""
-        arrays = (np.array(values) for values in state[:3])
+        attitude, others, covariance = (np.array(values) for values in state[:3])
         (walks, axes), (still_a, still_b) = state[3:]
-        return JointState(*arrays, (walks, axes), (still_a, still_b))
+        return JointState(attitude, others, covariance, (walks, axes), (still_a, still_b))
 
 
 BLOCK = 15

@@ -19,10 +19,13 @@ from brachium_fusion.joint_matrices import (
 
 @pytest.fixture(scope="module")
 def some():
-    """Return unit quaternions (200, 4) and vectors (200, 3), half turns about each axis among them."""
+    """Return unit quaternions (200, 4) and vectors (200, 3), vectors of less than half a turn."""
     random = np.random.default_rng(0)
     q = np.vstack([np.eye(4), random.normal(size=(196, 4))])
-    return rotation.normalize(q), random.normal(size=(200, 3))
+    v = random.normal(size=(200, 3))
+    return rotation.normalize(q), v * (
+        random.uniform(0.0, 3.1, (200, 1)) / np.linalg.norm(v, axis=1, keepdims=True)
+    )
 
 
 def test_matrices_and_quaternions_are_the_same_rotations(some):
