@@ -57,7 +57,10 @@ def find_joint_centre(motion: JointMotion) -> JointCentre | None:
     if motion.force_a is None or motion.force_b is None or len(motion.time_s) < 20:
         return None
     rows = _Rows(motion, motion.force_a, motion.force_b)
-    costs = [rows.constant(heading) for heading in rows.scanned]
+    costs = np.array([rows.constant(heading) for heading in rows.scanned])
+    spread = _spread(costs / len(motion.time_s))
+    if spread > UNSEEN:
+        return None
     x = rows.start(float(rows.scanned[int(np.argmin(costs))]))
     for _ in range(STEPS):
         x = x + rows.step(x)[0]
@@ -68,12 +71,21 @@ def find_joint_centre(motion: JointMotion) -> JointCentre | None:
     return JointCentre(
         knots_s=rows.knots_s,
         headings=x[6:],
-        headings_sd=sd[6:],
+        headings_sd=np.maximum(sd[6:], spread),
         lever_a=x[:3],
         lever_b=x[3:6],
         lever_a_sd=sd[:3],
         lever_b_sd=sd[3:6],
     )
+
+
+def _spread(costs: Floats) -> float:
+    """Return the circular standard deviation, rad, of a constant heading by the mean loss of each that was
+    scanned. About a resting elbow all of them fit: what is small around the best one says nothing there."""
+    noise = max(LEAST_NOISE, float(costs.min()) / 3.0)
+    odds = np.exp(-0.5 * INDEPENDENT / noise * (costs - costs.min()))
+    length = abs(odds @ np.exp(1j * _Rows.scanned)) / odds.sum()
+    return float(np.sqrt(max(0.0, -2.0 * np.log(max(length, 1e-9)))))
 
 
 class _Rows:

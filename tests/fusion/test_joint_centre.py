@@ -11,8 +11,9 @@ RATE = 100.0
 GRAVITY = np.array([0.0, 0.0, 9.81])
 
 
-def swung(heading, lever_a, lever_b, carried=0.3, seconds=20.0):
-    """Return the motion of two sensors on a ball joint whose centre is carried about, m."""
+def swung(heading, lever_a, lever_b, carried=0.3, seconds=20.0, skin=0.0):
+    """Return the motion of two sensors on a ball joint whose centre is carried about, m; `skin` m/s^2 wobbles
+    under each in its own way."""
     t = np.arange(round(seconds * RATE)) / RATE
     waves = np.stack([np.sin(2 * np.pi * f * t + f) for f in (0.31, 0.47, 0.63, 0.41, 0.53, 0.71)], axis=-1)
     a, b = (rotation.from_rotation_vector(0.6 * waves[:, i : i + 3]) for i in (0, 3))
@@ -21,7 +22,9 @@ def swung(heading, lever_a, lever_b, carried=0.3, seconds=20.0):
     for q, lever, turn in ((a, lever_a, 0.0), (b, lever_b, -heading)):
         place = centre - rotation.rotate(q, np.asarray(lever))
         acceleration = np.gradient(np.gradient(place, 1 / RATE, axis=0), 1 / RATE, axis=0)
-        force = rotation.rotate(rotation.inverse(q), acceleration + GRAVITY)
+        own_hz = [1.1, 1.5, 0.7] if turn else [0.9, 1.3, 1.7]
+        wobble = skin * np.sin(2 * np.pi * np.outer(t, own_hz))
+        force = rotation.rotate(rotation.inverse(q), acceleration + GRAVITY + wobble)
         sensors.append(
             SensorMotion(world_from_sensor=rotation.multiply(rotation.about(2, turn), q), acc=force)
         )
@@ -39,6 +42,15 @@ def test_heading_and_levers_are_found(heading):
 
 def test_about_a_joint_at_rest_no_heading_is_told():
     assert find_joint_centre(swung(0.4, (0.0, -0.15, 0.0), (0.0, 0.2, 0.0), carried=0.0)) is None
+
+
+@pytest.mark.parametrize("heading", [0.4, -2.9, 1.8])
+def test_what_skin_does_about_a_joint_at_rest_is_no_heading(heading):
+    lever_a, lever_b = (0.02, -0.15, 0.04), (0.0, 0.2, -0.03)
+    assert find_joint_centre(swung(heading, lever_a, lever_b, carried=0.0, skin=0.2)) is None
+    found = find_joint_centre(swung(heading, lever_a, lever_b, skin=0.2))
+    assert found is not None
+    assert (np.abs(rotation.wrap(found.headings - heading)) < 2.0 * found.headings_sd).all()
 
 
 def test_sensors_of_orientation_only_tell_nothing():
