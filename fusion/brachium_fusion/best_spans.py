@@ -8,6 +8,7 @@ import numpy.typing as npt
 from brachium_fusion.best_arm import Tracked
 from brachium_fusion.best_material import Material
 from brachium_fusion.pose_watch import POSE_USED_NS, STILL_S
+from brachium_fusion.segment_records import leaves_open
 from brachium_fusion.sensor_to_segment import Span
 from brachium_fusion.track import STILL_RAD_S
 
@@ -17,11 +18,8 @@ Floats = npt.NDArray[np.float64]
 def rows_of_spans(
     material: Material, tracked: Mapping[str, Tracked], time_s: Floats, rate_hz: float
 ) -> list[Span]:
-    """Return the spans as rows; unless free movement is stated, all that follows the first of them is.
-
-    Led movements of a still upper arm leave open where its flexion axis and the heading are: taken alone they
-    can turn an elbow round.
-    """
+    """Return the spans as rows; where the stated movements do not show an elbow's axes, all that follows the
+    pose is free movement."""
     spans = []
     for span in material.spans:
         first, end = np.searchsorted(time_s, [span.from_s - 1e-9, span.to_s + 1e-9]).tolist()
@@ -29,8 +27,8 @@ def rows_of_spans(
             spans.append(Span(kind=span.kind, first=first, end=end, angles_deg=dict(span.angles_deg)))  # type: ignore[arg-type]
     if not spans and material.find_pose:
         spans = _stillness(tracked, rate_hz)
-    stated_free = any(span.kind == "free" for span in spans)
-    if spans and not stated_free and spans[0].end + rate_hz < len(time_s):
+    open_yet = bool(spans) and leaves_open([span.kind for span in spans])
+    if open_yet and spans[0].end + rate_hz < len(time_s):
         spans.append(Span(kind="free", first=spans[0].end, end=len(time_s)))
     return spans
 

@@ -22,6 +22,7 @@ from brachium_fusion.joint_centre import JointCentre, find_joint_centre
 from brachium_fusion.joint_equations import AxisPriors, HeadingPrior
 from brachium_fusion.joint_motion import JointMotion, SensorMotion, joint_motion
 from brachium_fusion.segment_frames import ElbowFrames, ElbowPose, elbow_angles, elbow_frames, excursion_deg
+from brachium_fusion.segment_records import leaves_open
 
 Floats = npt.NDArray[np.float64]
 
@@ -101,12 +102,11 @@ def find_elbow(
         wrong = span_reasons(fitted.motion, fitted.found, fitted.frames, spans, rate_hz)
         refused |= {f"{spans[place][0]}{end}": why for place, why in wrong.items()}
         spans = [span for place, span in enumerate(spans) if place not in wrong]
-        if wrong and not any(kind in BENDING for kind, _, _ in spans):
-            spans = _all_of_it(all_spans, sensors, rate_hz)
-            if not spans:
-                return Refused(reasons=refused)
-            continue
         if wrong:
+            if leaves_open([kind for kind, _, _ in spans]):
+                spans = _all_of_it(all_spans, sensors, rate_hz) or spans
+            if not any(kind in BENDING for kind, _, _ in spans):
+                return Refused(reasons=refused)
             continue
         if degrees(fitted.found.axis_a_sd) > UNSURE_DEG and not any(kind == "free" for kind, _, _ in spans):
             # a still upper arm leaves open where its axis points: what came between may show it
@@ -135,12 +135,12 @@ def fit_elbow(
     motion = joint_motion(sensors.upper, sensors.forearm, rows, rate_hz)
     if len(motion.time_s) < FEWEST_ROWS:
         return "too few samples of upper arm and forearm together in the spans: at least 2 s are needed"
-    centre = find_joint_centre(motion)
-    solutions = fit_joint_axes(motion, _priors(sensors, pose, centre))
-    # the elbow's range shows in all that was recorded near the spans
+    # the elbow's centre and its range show in all that was recorded near the spans
     margin, last = round(NEAR_S * rate_hz), len(sensors.upper.world_from_sensor)
     around = [(max(0, first - margin), min(last, end + margin)) for first, end in rows]
     seen = joint_motion(sensors.upper, sensors.forearm, around, rate_hz)
+    centre = find_joint_centre(seen)
+    solutions = fit_joint_axes(motion, _priors(sensors, pose, centre))
     nominal = sensors.nominal_upper, sensors.nominal_forearm
     judged = [(f, elbow_frames(seen, f, pose, sensors.side, *nominal)) for f in solutions]
     found, frames = min(judged, key=lambda pair: pair[0].cost - pair[1].merit)

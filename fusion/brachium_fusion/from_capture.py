@@ -11,6 +11,7 @@ from brachium_fusion.best_material import Material, TimedSpan
 from brachium_fusion.motion_record import MotionRecord
 from brachium_fusion.pipeline import Pipeline
 from brachium_fusion.pose import POSES, Alignment
+from brachium_fusion.segment_records import leaves_open
 from brachium_fusion.sensor_to_segment import Span, align_segments
 from brachium_fusion.session_terms import check_session
 from brachium_fusion.settings import Settings
@@ -28,7 +29,7 @@ ZERO_NS = 1_000_000_000_000_000
 BATCH = 16
 FREE_S = 120.0
 """Where movements are led, or only movement can tell the headings, all of it up to so long after the pose is
-used beside what is stated: led movements of a still upper arm leave the flexion axis and the heading open."""
+looked at beside what is stated: it shows heading, centre and range of the joints."""
 
 
 def nanoseconds(t: npt.ArrayLike) -> npt.NDArray[np.int64]:
@@ -199,11 +200,13 @@ def _alignment(capture: Capture, settings: Settings) -> Alignment | None:
     spans = _timed(capture)
     if not any(span.kind in POSES for span in spans):
         return None
-    if (len(spans) > 1 or _loose(capture)) and not any(span.kind == "free" for span in spans):
-        spans += (TimedSpan(kind="free", from_s=spans[0].to_s, to_s=spans[0].to_s + FREE_S),)
+    end_s = max(span.to_s for span in spans)
+    if len(spans) > 1 or _loose(capture):
+        whole = TimedSpan(kind="free", from_s=spans[0].to_s, to_s=spans[0].to_s + FREE_S)
+        end_s = max(end_s, whole.to_s)
+        spans += (whole,) if leaves_open([span.kind for span in spans]) else ()
     subject = Subject(replace(settings, joints=False), lambda _: None)
     times = output_times(capture, None)
-    end_s = max(span.to_s for span in spans)
     wanted = times[times <= end_s + 1e-9]
     _begin(subject, capture, nanoseconds(wanted).tolist())
     record = MotionRecord()

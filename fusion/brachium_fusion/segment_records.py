@@ -1,6 +1,6 @@
 """What alignment works on: sensors over the rows of a recording, and what was done in which of them. Pure."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from math import degrees
 from typing import Literal
@@ -14,6 +14,7 @@ from brachium_fusion.pose import POSES
 Floats = npt.NDArray[np.float64]
 SpanKind = Literal["n-pose", "table", "given", "elbow-flexion", "pronation", "free"]
 
+LED: tuple[SpanKind, ...] = ("elbow-flexion", "pronation")
 SWAY_LIMIT_DEG = 5.0
 """A pose in which a sensor turned by more than this (rms) was not held."""
 
@@ -45,6 +46,12 @@ class SensorRecord:
     """(n, 3) m/s^2, calibrated; finds the heading between sensors of a joint that is moved about. None for
     sensors that deliver orientation only."""
     mag: Floats | None = None
+
+
+def leaves_open(kinds: Collection[str]) -> bool:
+    """Return whether movements of these kinds show less than both axes of an elbow, so that whatever else was
+    recorded should be used with them. Free movement strains skin in more ways than led movement does."""
+    return "free" not in kinds and not set(LED) <= set(kinds)
 
 
 def check(records: Mapping[str, SensorRecord], spans: Sequence[Span], rate_hz: float) -> None:
