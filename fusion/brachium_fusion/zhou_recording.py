@@ -65,7 +65,15 @@ def solve_zhou(
     held = pose.end - pose.first
     cycles = [held + c for c in find_cycles(np.concatenate([s.gyr for s in sensors], axis=1)[held:], rate_hz)]
     settings = ZhouSettings(corrected=PRINTED if name == "zhou-printed" else CORRECTED, drift="cycle_reset")
-    motion = track(*sensors, (lengths.upper_arm, lengths.forearm), rate_hz, slice(0, held), settings, cycles)
+    motion = track(
+        sensors[0],
+        sensors[1],
+        (lengths.upper_arm, lengths.forearm),
+        rate_hz,
+        slice(0, held),
+        settings,
+        cycles,
+    )
     orientations = (motion.world_from_upper_arm, motion.world_from_forearm)
     for segment, one, found in zip((upper, forearm), raw, orientations, strict=True):
         turned = one.world_from_sensor.copy()

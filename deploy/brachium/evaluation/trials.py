@@ -125,7 +125,7 @@ def joints(sensors: Mapping[Segment, SensorArrays]) -> dict[JointName, Joint]:
     found: dict[JointName, Joint] = {}
     known: tuple[tuple[JointName, int], ...] = (("shoulder", 3), ("elbow", 2), ("wrist", 2))
     for joint, axes in known:
-        centres = {
+        centres: dict[Segment, Vector] = {
             name: _vector(sensor.levers[joint]) for name, sensor in sensors.items() if joint in sensor.levers
         }
         if len(centres) > 1 or (joint == "shoulder" and centres):

@@ -41,7 +41,7 @@ def case(number: int) -> Case:
     kind, both = KINDS[number % len(KINDS)], number // len(KINDS) % 2 == 1
     side: Side = SIDES[number // (2 * len(KINDS)) % 2]
     arms = SIDES if both or kind == "arms exchanged" else (side,)
-    nodes = tuple(segment for arm in arms for segment in arm_segments(arm))
+    nodes: tuple[Segment, ...] = tuple(segment for arm in arms for segment in arm_segments(arm))
     seats: dict[Segment, Segment] = {}
     turned: dict[Segment, Turn] = {}
     if "swapped" in kind:
