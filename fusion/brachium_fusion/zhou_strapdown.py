@@ -65,7 +65,8 @@ def world_acceleration(world_from_sensor: Floats, acc: Floats) -> Floats:
     Eq 3 adds [0, 0, 9.81], which is right where z points down; here it points up (erratum Z1).
     """
     force: Floats = np.einsum("nij,nj->ni", world_from_sensor, acc)
-    return force - np.array([0.0, 0.0, G])
+    acceleration: Floats = force - np.array([0.0, 0.0, G])
+    return acceleration
 
 
 def displacement(acceleration: Floats, rate_hz: float) -> Floats:
