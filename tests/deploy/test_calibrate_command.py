@@ -1,0 +1,96 @@
+"""`brachium calibrate` against fusion on a router: what it says, how it ends, what is kept."""
+
+import json
+import signal
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from brachium.__main__ import main
+from brachium_fusion.service import FuseSettings
+from brachium_fusion.service import run as fuse
+from brachium_fusion.settings import Settings
+from brachium_nodes.emulate import EmulateSettings
+from brachium_nodes.emulate import run as emulate
+from brachium_wire import keys
+from brachium_wire.bus import Bus
+
+pytestmark = pytest.mark.network
+
+ROOM = "guided"
+
+
+@pytest.fixture(autouse=True)
+def signals() -> Iterator[None]:
+    """Put back what a command hears of signals."""
+    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+    yield
+    for number, handler in before.items():
+        signal.signal(number, handler)
+
+
+@pytest.fixture
+def network(endpoint: str, tmp_path: Path) -> Iterator[str]:
+    """Run fusion, and an emulated wearer who stands still and then bends the elbow."""
+    stop = threading.Event()
+    settings = FuseSettings(
+        endpoint=endpoint, room=ROOM, pipeline=Settings(auto_pose=False), keep=tmp_path / "kept"
+    )
+    wearer = EmulateSettings(endpoint=endpoint, room=ROOM, subject="p01", direct=True)
+    running = [
+        threading.Thread(target=fuse, args=(settings, stop)),
+        threading.Thread(target=emulate, args=(wearer, stop)),
+    ]
+    with Bus.open(endpoint) as bus:
+        heard = bus.subscribe(keys.subjects(ROOM, "skeleton/*"))
+        for thread in running:
+            thread.start()
+        assert heard.wait(20.0)
+    yield endpoint
+    stop.set()
+    for thread in running:
+        thread.join(10.0)
+
+
+def test_a_pose_is_asked_for_in_words_and_its_scores_are_told(
+    network: str, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    words = ["calibrate", "--endpoint", network, "--room", ROOM, "--routine", "pose", "--seconds", "1"]
+    assert main(words) == 0
+    said = capsys.readouterr().out
+    assert "0 %  stand or sit still" in said
+    assert "calibrated; forward: " in said
+    assert not (tmp_path / "kept").exists()  # nobody wears these sensors
+
+
+def test_a_refusal_is_one_line_and_an_exit_code(network: str, capsys: pytest.CaptureFixture[str]) -> None:
+    words = ["calibrate", "--endpoint", network, "--room", ROOM, "--subject", "nobody", "--json"]
+    assert main(words) == 1
+    said = capsys.readouterr()
+    assert json.loads(said.out)["ok"] is False
+    assert "no sensor of subject 'nobody'" in said.err
+
+
+def test_without_fusion_it_says_so(endpoint: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["calibrate", "--endpoint", endpoint, "--room", "empty"]) == 1
+    assert "fusion does not answer" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--angle", "elbow_flexion=35"], "belongs to --pose given"),
+        (["--pose", "given", "--angle", "elbow"], "write NAME=DEG"),
+        (["--seconds", "0"], "from 1 to 30"),
+        (["--routine", "dance"], "invalid choice"),
+    ],
+)
+def test_bad_input_is_usage(words: list[str], said: str, capsys: pytest.CaptureFixture[str]) -> None:
+    try:
+        code = main(["calibrate", *words])
+    except SystemExit as ended:
+        code = ended.code
+    assert code == 2
+    assert said in capsys.readouterr().err
