@@ -5,6 +5,7 @@ Movement shows two lines and the heading between the sensors; what else is neede
 * Signs. The forearm's axis points to the elbow, the flexion axis to the subject's right (for both arms, as Z
   of every segment does). Each of the four choices is judged by gravity in the pose, by the elbow's plausible
   range over the whole movement, and by the nominal mounting where one is known.
+* Level. While the upper arm hangs its flexion axis is level: one that movement shows but roughly gives way.
 * Zero of flexion. Turning the upper arm's axes about its flexion axis changes nothing that the joint shows.
   Three things are weighed: what the pose states (n-pose: straight), gravity along the hanging upper arm
   against the forearm's turning axis, and that no elbow bends far backwards in all the movement. The pose
@@ -80,7 +81,7 @@ def elbow_frames(
 ) -> ElbowFrames:
     """Return the axes of both segments. `nominal_...` are segment_from_sensor (4,) as told, if known."""
     choices = (
-        _frames(motion, found, pose, side, sign_a * found.axis_a, sign_b * found.axis_b)
+        _frames(motion, found, pose, side, sign_a * _levelled(found, pose), sign_b * found.axis_b)
         for sign_a, sign_b in product((1.0, -1.0), repeat=2)
     )
     judged = [
@@ -93,6 +94,17 @@ def elbow_frames(
         for f in choices
     ]
     return max(judged, key=lambda frames: frames.merit)
+
+
+def _levelled(found: JointAxes, pose: ElbowPose) -> Floats:
+    """Return the flexion axis, which is level while the upper arm hangs, by the weights of both findings."""
+    if not pose.hanging:
+        return found.axis_a
+    up = rotation.rotate(rotation.inverse(pose.upper_sensor), np.array([0.0, 0.0, 1.0]))
+    weight = found.axis_a_sd**2 / (found.axis_a_sd**2 + VERTICAL_SD**2)
+    axis = found.axis_a - weight * float(found.axis_a @ up) * up
+    levelled: Floats = axis / np.linalg.norm(axis)
+    return levelled
 
 
 def _frames(
