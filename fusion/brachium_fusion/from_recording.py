@@ -44,6 +44,8 @@ class Contents:
     """What fusion said of itself, where there is no snapshot."""
     live: list[Skeleton] = field(default_factory=list)
     """The skeletons that were published."""
+    foreign_snapshot: bool = False
+    """Found while solving: the snapshot is of another version of fusion."""
 
 
 def sort_out(messages: Iterable[Recorded]) -> dict[str, Contents]:
@@ -85,7 +87,10 @@ def solve(subject: str, contents: Contents, settings: Settings) -> tuple[Pipelin
     pipeline = Pipeline(settings)
     changes = list(contents.changes)
     if contents.snapshot is not None and settings == settings_of(contents):
-        pipeline.restore(subject, contents.snapshot)
+        try:
+            pipeline.restore(subject, contents.snapshot)
+        except (KeyError, TypeError, ValueError, IndexError, AttributeError):
+            contents.foreign_snapshot, pipeline = True, Pipeline(settings)
         begun = pipeline.subject(subject)
         known = begun.pending()
         changes = [c for c in changes if c.from_ns >= begun.next_tick_ns() and c not in known]

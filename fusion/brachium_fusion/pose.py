@@ -165,7 +165,7 @@ def align(
         mounting=mounting,
         assumed=frozenset(assumed),
         scores=scores,
-        warnings=_warnings(forward, assumed, scores),
+        warnings=warnings_for(forward, assumed, scores),
     )
 
 
@@ -251,7 +251,8 @@ def _turn(start: Floats, end: Floats) -> float:
     return float(np.arctan2(start[0] * end[1] - start[1] * end[0], start[0] * end[0] + start[1] * end[1]))
 
 
-def _warnings(forward: Forward, assumed: set[str], scores: dict[str, float]) -> tuple[str, ...]:
+def warnings_for(forward: Forward, assumed: set[str], scores: dict[str, float]) -> tuple[str, ...]:
+    """Return what a person should know of an alignment, one line each."""
     warnings = []
     if forward == "none":
         warnings.append(

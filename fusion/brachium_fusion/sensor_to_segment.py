@@ -20,7 +20,15 @@ from brachium_fusion.elbow_alignment import ElbowFound, ElbowSensors, Refused, f
 from brachium_fusion.free_pose import pose_from_movement
 from brachium_fusion.hand_alignment import hand_mounting, wrist_heading
 from brachium_fusion.joint_motion import SensorMotion
-from brachium_fusion.pose import POSES, Alignment, PoseName, PoseSensor, align, pose_orientations
+from brachium_fusion.pose import (
+    POSES,
+    Alignment,
+    PoseName,
+    PoseSensor,
+    align,
+    pose_orientations,
+    warnings_for,
+)
 from brachium_fusion.segment_frames import ElbowPose
 from brachium_fusion.segment_records import SensorRecord, Span, SpanKind, check, held_pose, rows_of
 
@@ -209,4 +217,5 @@ def _joined(
         scores=scores,
         joints={f"elbow_{side[0]}": found.joint for side, found in elbows.items()},
         refused=refused,
+        warnings=warnings_for(base.forward, assumed, scores),
     )

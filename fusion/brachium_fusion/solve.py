@@ -15,6 +15,7 @@ from brachium_fusion.best_material import Material
 from brachium_fusion.orientation import FilterName
 from brachium_fusion.result import tabulate
 from brachium_fusion.settings import Settings
+from brachium_fusion.shoulder_model import NOT_OBSERVABLE_WITHOUT_STERNUM
 from brachium_fusion.solve_terms import (
     MODES,
     NO_CALIBRATION,
@@ -123,6 +124,8 @@ def _recording(settings: SolveSettings) -> Outcome:
     if settings.mode == "best" or zhou:
         return _best_recording(name, contents, chosen, warnings, zhou)
     pipeline, solved = from_recording.solve(name, contents, chosen)
+    if contents.foreign_snapshot:
+        warnings.append("begins with the state of another version of fusion: solved from its first sample")
     skeletons = [s.skeleton for s in solved if s.subject == name]
     compared, angle, position = (
         from_recording.largest_difference(skeletons, contents.live) if chosen == live else (0, 0.0, 0.0)
@@ -192,7 +195,9 @@ def _finish(settings: SolveSettings, outcome: Outcome) -> SolveReport:
         for segment, pose in skeleton.segments.items():
             if segment != "sternum" or skeleton.side == first:  # both arms name the one sternum
                 quality.setdefault(segment, Counter())[pose.quality] += 1
-    live = outcome.live
+    live, warnings = outcome.live, outcome.warnings
+    if any(s.shoulder_shift is not None and "sternum" not in s.segments for s in skeletons):
+        warnings = list(dict.fromkeys([*warnings, NOT_OBSERVABLE_WITHOUT_STERNUM]))
     return SolveReport(
         rows=len({s.time_ns for s in skeletons}),
         sides=sorted({s.side for s in skeletons}),
@@ -200,7 +205,7 @@ def _finish(settings: SolveSettings, outcome: Outcome) -> SolveReport:
         forward=forward,
         quality={segment: dict(counts) for segment, counts in quality.items()},
         drops=dict(outcome.drops),
-        warnings=outcome.warnings,
+        warnings=warnings,
         scores={} if alignment is None else alignment.scores,
         mode=settings.mode,
         parts=outcome.parts,

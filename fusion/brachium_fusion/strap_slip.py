@@ -19,9 +19,9 @@ import numpy.typing as npt
 
 from brachium_body.segments import part_of, side_of
 from brachium_fusion.joint_model import Joint
-from brachium_fusion.timeline import SensorNow
 from brachium_fusion.slip_joints import JointTurned, JointTurns
 from brachium_fusion.slip_postures import NEAR, evidence_of, turned_since
+from brachium_fusion.timeline import SensorNow
 
 Floats = npt.NDArray[np.float64]
 

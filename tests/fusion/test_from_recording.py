@@ -9,9 +9,9 @@ import pytest
 
 from brachium_fusion import from_recording
 from brachium_fusion.pipeline import Pipeline
+from brachium_fusion.settings import Change, Settings
 from brachium_fusion.solve import SolveError, SolveSettings
 from brachium_fusion.solve import run as solve
-from brachium_fusion.settings import Change, Settings
 from brachium_nodes.link import FaultSettings
 from brachium_nodes.wearer import Wearer, WearerSettings
 from brachium_wire import keys
@@ -241,3 +241,22 @@ def test_without_a_snapshot_the_settings_are_those_that_fusion_told() -> None:
     other = Event(time_ns=2, kind="settings", data={"filter": "vqf", "unknown": 1})
     messages = [Recorded(keys.event("room", SUBJECT), encode(e), e.time_ns) for e in (told, other)]
     assert from_recording.settings_of(from_recording.sort_out(messages)[SUBJECT]) == chosen
+
+
+def test_a_snapshot_of_another_version_is_left_aside_and_told(messages, tmp_path) -> None:
+    live = Live(tmp_path / "a.mcap")
+    live.record()
+    for turn in turns(messages[: len(messages) // 2], 7):
+        live.hear(turn)
+    live.close()
+    with read(tmp_path / "a.mcap") as recorded:
+        content = list(recorded)
+    with RecordingWriter(tmp_path / "b.mcap") as writer:
+        for key, payload, time_ns in content:
+            if keys.parse(key).topic == "snapshot":
+                snapshot = decode(payload, Snapshot)
+                payload = encode(msgspec.structs.replace(snapshot, state=b"\x82\xa7subject\x80\xa4arms\x80"))
+            writer.write(key, payload, time_ns)
+    report = solve(SolveSettings(input=tmp_path / "b.mcap"))
+    assert report.rows > 100
+    assert any("another version of fusion" in warning for warning in report.warnings)
