@@ -8,6 +8,7 @@ import numpy.typing as npt
 
 from brachium_body import rotation
 from brachium_fusion.sensor_to_segment import SensorRecord
+from brachium_fusion.steady_heading import steady
 from brachium_fusion.timeline import Reading, at_instant
 from brachium_fusion.track import SegmentTrack
 
@@ -40,8 +41,12 @@ class MotionRecord:
         self.times_ns.append(now)
 
     def records(self, tracks: Mapping[str, SegmentTrack]) -> dict[str, SensorRecord]:
-        """Return all sensors' records, of equal length; NaN where one was not there."""
+        """Return all sensors' records, of equal length; NaN where one was not there.
+
+        A magnetometer's heading is held steady by the gyroscope.
+        """
         found = {}
+        rate_hz = 1e9 / float(np.median(np.diff(self.times_ns))) if len(self.times_ns) > 1 else 1.0
         for segment, rows in self._rows.items():
             track = tracks.get(segment)
             if track is None:
@@ -49,8 +54,11 @@ class MotionRecord:
             block = np.full((len(self.times_ns), _WIDTH), np.nan)
             block[[index for index, _ in rows]] = [row for _, row in rows]
             raw = not track.info.orientation_only
+            world_from_sensor = rotation.normalize(block[:, :4])
+            if track.magnetometer:
+                world_from_sensor = steady(world_from_sensor, block[:, 4:7], block[:, 7:], rate_hz)
             found[segment] = SensorRecord(
-                world_from_sensor=rotation.normalize(block[:, :4]),
+                world_from_sensor=world_from_sensor,
                 magnetometer=track.magnetometer or not raw,
                 nominal_mounting=None if track.info.mounting is None else np.array(track.info.mounting),
                 gyr=block[:, 4:7] if raw else None,
