@@ -16,6 +16,8 @@ from brachium_fusion.heading_smoother import fit_heading
 Floats = npt.NDArray[np.float64]
 Bools = npt.NDArray[np.bool_]
 
+CARRIED_S = 0.5
+"""A gap up to this is carried over: straight lines miss less than a fresh start does not know."""
 STEP_S = 0.2
 """The field is averaged over this: short against the drift of a heading, long against the noise."""
 
@@ -36,13 +38,17 @@ def smooth_orientation(gyr: Floats, acc: Floats, mag: Floats | None, rate_hz: fl
     """Return the orientation at each of n samples on a uniform grid.
 
     `gyr` rad/s, `acc` m/s^2, `mag` in any unit that is the same throughout, (n, 3) each in sensor axes.
-    Rows of NaN in `gyr` or `acc` are gaps, over which tilt and heading are lost; rows of NaN in `mag` are
-    samples without a magnetometer value. Tilt and bias are offline VQF's (Laidig and Seel 2023), forwards and
-    backwards; without any magnetometer value the orientation is too.
+    Rows of NaN in `gyr` or `acc` are gaps: short ones are carried over along straight lines, as live, over
+    others tilt and heading are lost. Rows of NaN in `mag` are samples without a magnetometer value. Tilt and
+    bias are offline VQF's (Laidig and Seel 2023), forwards and backwards; without any magnetometer value the
+    orientation is too.
     """
     n = len(gyr)
     result = OfflineOrientation(np.full((n, 4), np.nan), np.zeros(n, dtype=np.bool_), np.full((n, 3), np.nan))
-    pieces = _pieces(np.isfinite(np.concatenate([gyr, acc], axis=1).sum(axis=1)))
+    measured = np.isfinite(np.concatenate([gyr, acc], axis=1).sum(axis=1))
+    carried = measured | _short_gaps(measured, CARRIED_S * rate_hz)
+    gyr, acc = (_between(values, measured, carried) for values in (gyr, acc))
+    pieces = _pieces(carried)
     for piece in pieces:
         tilted = offlineVQF(
             np.ascontiguousarray(gyr[piece]), np.ascontiguousarray(acc[piece]), None, 1.0 / rate_hz
@@ -50,7 +56,10 @@ def smooth_orientation(gyr: Floats, acc: Floats, mag: Floats | None, rate_hz: fl
         result.world_from_sensor[piece] = tilted["quat6D"]
         result.gyro_bias[piece] = tilted["bias"]
     if mag is not None and not np.isnan(mag).all():
-        _turn_to_north(result, pieces, gyr, mag, rate_hz)
+        _turn_to_north(result, pieces, gyr, np.where(measured[:, None], mag, np.nan), rate_hz)
+    for rows in (result.world_from_sensor, result.gyro_bias):
+        rows[~measured] = np.nan
+    result.disturbed[~measured] = False
     return result
 
 
@@ -85,6 +94,26 @@ def _turn_to_north(
         )
         nearest = np.minimum(np.arange(n) // min(count, n), span.stop - span.start - 1)
         result.disturbed[piece] = fit.disturbed[span][nearest]
+
+
+def _short_gaps(measured: Bools, longest: float) -> Bools:
+    """Return the rows of gaps of up to `longest` samples, without those at the ends."""
+    short = np.zeros_like(measured)
+    for gap in _pieces(~measured):
+        if gap.start > 0 and gap.stop < len(measured) and gap.stop - gap.start <= longest:
+            short[gap] = True
+    return short
+
+
+def _between(values: Floats, measured: Bools, wanted: Bools) -> Floats:
+    """Return values (n, 3) with straight lines over the wanted rows that were not measured."""
+    rows, missing = np.flatnonzero(measured), np.flatnonzero(wanted & ~measured)
+    if not len(missing):
+        return values
+    result = values.copy()
+    for axis in range(values.shape[1]):
+        result[missing, axis] = np.interp(missing, rows, values[rows, axis])
+    return result
 
 
 def _pieces(measured: Bools) -> list[slice]:

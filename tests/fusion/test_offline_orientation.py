@@ -139,6 +139,19 @@ def test_after_a_gap_the_heading_is_found_anew_and_the_gap_stays_one() -> None:
     assert errors[7020:].max() < 0.5
 
 
+def test_bursts_of_loss_cost_little_and_stay_gaps() -> None:
+    truth, gyr, acc, mag = turning(6, 60.0)
+    gone = np.zeros(len(gyr), dtype=bool)
+    for start in range(900, 5900, 130):
+        gone[start : start + 25] = True
+    lossy = [np.where(gone[:, None], np.nan, block) for block in (gyr, acc, mag)]
+    found = smooth_orientation(*lossy, RATE)
+    assert np.isnan(found.world_from_sensor[gone]).all()
+    assert not found.disturbed[gone].any()
+    assert rms(errors_deg(found.world_from_sensor[~gone], truth[~gone])) < 2.0
+    assert np.isnan(gyr).sum() == 0  # what was given stays as it was
+
+
 def test_the_unit_of_the_field_does_not_matter() -> None:
     _, gyr, acc, mag = turning(9, 40.0)
     mag = mag + np.array([4.0, 1.0, -2.0])
