@@ -12,6 +12,7 @@ from threading import Event
 from brachium_body.segments import Side
 from brachium_nodes.direct_node import DirectHost, DirectSink
 from brachium_nodes.emulated_nodes import alike, node_id, node_streams
+from brachium_nodes.firmware_wearer import FirmwareWearer
 from brachium_nodes.gateway import token_sha256
 from brachium_nodes.host_claim import checked_host
 from brachium_nodes.link import FaultSettings
@@ -46,6 +47,8 @@ class EmulateSettings:
     gateway: str = "ws://127.0.0.1:8765/node"
     token: str = ""
     """The nodes' token at the gateway."""
+    firmware: bool = False
+    """The nodes are the wearables' firmware on MicroPython; it makes its own faults."""
     direct: bool = False
     """Publish without a gateway."""
     speed: float = 1.0
@@ -67,6 +70,10 @@ class EmulateSettings:
             raise ValueError(f"speed {self.speed} cannot be used; give a positive one, and direct if not 1")
         if not self.direct and not self.token:
             raise ValueError("nodes need a token to join a gateway; give one, or publish directly")
+        if self.firmware and (self.direct or self.wearers != 1 or self.wearer.mag_every != 1):
+            raise ValueError(
+                "firmware is worn by one wearer, through a gateway, and asks for the field itself"
+            )
         if self.wearers < 1:
             raise ValueError(f"{self.wearers} wearers cannot be; give 1 or more")
         if self.wearer.batch > LARGEST_BATCH:
@@ -133,24 +140,32 @@ class _Emulation:
         settings = self._settings
         if settings.direct:
             self._direct = DirectHost(self._bus, settings.room, settings.id, self._timeline)
-        boot = secrets.randbits(32)
-        streams = [
-            stream
-            for wearer, subjects in self._wearers
-            for stream in alike(node_streams(subjects[0], wearer, settings.faults, boot), subjects)
-        ]
-        self._nodes = [(stream, self._sink(stream)) for stream in streams]
         if settings.session:
             for subject in settings.subjects():
                 self._bus.retain(keys.session(settings.room, subject), encode(session(settings.wearer)))
         end_s = inf if settings.seconds is None else settings.seconds
-        counts = await send_streams(self._nodes, self._timeline, end_s, self._stop, self._beside)
+        counts = await (self._wear_firmware(end_s) if settings.firmware else self._send(end_s))
         report: dict[str, dict[str, StreamCount]] = {}
         for (subject, segment), count in counts.items():
             report.setdefault(subject, {})[segment] = count
             self._heart.counts["samples"] += count.sent
         self._heart.beat(now=True)
         return EmulateReport(streams=report)
+
+    async def _wear_firmware(self, end_s: float) -> dict[tuple[str, str], StreamCount]:
+        settings, ((wearer, (subject,)),) = self._settings, self._wearers
+        worn = FirmwareWearer(wearer=wearer, subject=subject, gateway=settings.gateway, token=settings.token)
+        return await worn.run(self._timeline, end_s, self._stop, self._beside)
+
+    async def _send(self, end_s: float) -> dict[tuple[str, str], StreamCount]:
+        settings, boot = self._settings, secrets.randbits(32)
+        streams = [
+            stream
+            for wearer, subjects in self._wearers
+            for stream in alike(node_streams(subjects[0], wearer, settings.faults, boot), subjects)
+        ]
+        self._nodes = [(stream, self._sink(stream)) for stream in streams]
+        return await send_streams(self._nodes, self._timeline, end_s, self._stop, self._beside)
 
     def _sink(self, stream: NodeStream) -> Sink:
         if self._direct is not None:

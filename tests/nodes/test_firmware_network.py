@@ -8,7 +8,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from brachium_nodes.firmware_host import ACC_STEP, BoardSettings, FirmwareNode, FirmwareReport, feed, prepare
+from brachium_nodes.firmware_host import (
+    ACC_STEP,
+    BoardSettings,
+    FirmwareNode,
+    FirmwareReport,
+    feed,
+    prepare,
+    stop_all,
+)
 from brachium_nodes.gateway import token_sha256
 from brachium_nodes.roster import NodeEntry
 from brachium_nodes.wearer import Wearer, WearerSettings
@@ -88,8 +96,7 @@ def switched_on(*nodes: FirmwareNode) -> Iterator[list[FirmwareReport]]:
     try:
         yield reports
     finally:
-        for node in nodes:
-            reports.append(node.stop())
+        reports += stop_all(nodes)
 
 
 def test_every_chip_is_read_whole_and_on_time_whatever_its_bus_does(
@@ -118,7 +125,8 @@ def test_every_chip_is_read_whole_and_on_time_whatever_its_bus_does(
         one.times_are_true(batches, numbers)
         assert status.received == len(numbers)
         assert status.lost == numbers[-1] - numbers[0] + 1 - len(numbers)
-        assert (status.out_of_order, status.late, status.node_dropped, status.drops) == (0, 0, 0, {})
+        assert (status.out_of_order, status.late, status.node_dropped) == (0, 0, 0)
+        assert set(status.drops) <= {"repeated"}  # what was being sent as the node was stopped goes out again
         assert status.rssi_dbm == -58.0
         assert 4.0 < status.battery_v < 4.1
         assert status.battery_hours > 1.0
@@ -155,6 +163,8 @@ def test_a_gateway_is_found_and_the_field_turned_into_the_accelerometers_axes_at
     seen = 0
     for batch in batches:
         samples = read_samples(batch)
+        if samples.mag is None:
+            continue
         for row, at in zip(samples.mag, samples.mag_index, strict=True):
             number = batch.sequence + at + first
             if number > 1:

@@ -42,7 +42,12 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--level", default="typical", choices=sorted(FAULTS), help="of sensors and radio")
     parser.add_argument("--arms", default="right", help="right, left or both")
     parser.add_argument("--seed", type=seed, default=1, help="of everything random")
-    parser.add_argument("--nodes", default="emulated", choices=["emulated"], help="what wearables are")
+    parser.add_argument(
+        "--nodes",
+        default="emulated",
+        choices=["emulated", "micropython"],
+        help="what wearables are; micropython: their own firmware runs here",
+    )
     parser.add_argument(
         "--loss", type=probability, help="probability that a packet is lost (default: by level)"
     )
@@ -144,7 +149,11 @@ def _report(
 def _wearer_words(args: argparse.Namespace) -> list[str]:
     """Return the command line of the emulated wearer."""
     faults = {**FAULTS[args.level], **({} if args.loss is None else {"loss": args.loss})}
+    if args.nodes == "micropython":
+        faults = {}  # the firmware meets its own: a bus that refuses
     words = [
+        "--nodes",
+        args.nodes,
         "--exercise",
         args.exercise,
         "--arms",

@@ -28,6 +28,12 @@ def configure(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="each of many wearers moves by itself: some twenty a core (default: all move as the first)",
     )
+    parser.add_argument(
+        "--nodes",
+        default="emulated",
+        choices=["emulated", "micropython"],
+        help=f"micropython: the wearables' own firmware, through a gateway (default: {GATEWAY})",
+    )
     add_wearer(parser)
     add_faults(parser)
 
@@ -83,7 +89,8 @@ def settings(args: argparse.Namespace, token: str) -> "EmulateSettings":
         room=args.room,
         gateway=args.gateway or GATEWAY,
         token=token,
-        direct=args.gateway is None and not args.print_nodes,
+        firmware=args.nodes == "micropython",
+        direct=args.gateway is None and not args.print_nodes and args.nodes == "emulated",
         speed=args.speed,
         seconds=args.seconds,
         subject=args.subject,

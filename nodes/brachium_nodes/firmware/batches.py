@@ -22,7 +22,7 @@ class Batches:
         self._open = self._free.pop()
         self.keeping = False  # before the first welcome nobody asks for samples
         self.connected = False
-        self.dropped = 0  # samples
+        self.dropped = self.delivered = 0  # samples
         self.wake = None  # called when there is one to send
 
     def _get(self, slot, where):
@@ -69,7 +69,7 @@ class Batches:
         if not self._free:
             oldest = self._full.pop(0)
             self.dropped += self._get(oldest, _SAMPLES)
-            self.sent(oldest)
+            self._give_back(oldest)
         self._open = self._free.pop()
         if self.wake is not None:
             self.wake()
@@ -84,6 +84,10 @@ class Batches:
 
     def sent(self, slot):
         """Take a batch back that went out."""
+        self.delivered += self._get(slot, _SAMPLES)
+        self._give_back(slot)
+
+    def _give_back(self, slot):
         self._clear(slot)
         self._free.append(slot)
 

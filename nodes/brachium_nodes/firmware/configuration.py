@@ -13,7 +13,7 @@ DEFAULTS = {
     "rate_hz": 50,
     "batch": 5,
     "poll_ms": 40,
-    "queue_s": 1.5,
+    "queue_s": 1,
     "longest_pause_s": 30,
     "discovery": {"address": "255.255.255.255", "port": 8766},
     "i2c": {"id": -1, "scl": 5, "sda": 4, "hz": 400000},  # id -1: bit-banged, as an ESP8266 must

@@ -3,7 +3,7 @@
 import time
 
 FRACTION = 8  # bits below a microsecond
-LEARN_US = 8_000_000
+LEARN_US, ANEW_US = 4_000_000, 16_000_000
 
 
 class DeviceClock:
@@ -86,6 +86,7 @@ class SampleClock:
         if due - since < LEARN_US:
             return
         seen = ((due - since) << FRACTION) // (self.number - number)
-        self._learning = self.number, due
         if abs(seen - self.nominal) < self.nominal // 16:
-            self.period += (seen - self.period) // 2
+            self.period = seen
+        if due - since >= ANEW_US:
+            self._learning = self.number, due

@@ -2,6 +2,7 @@
 
 import asyncio
 import binascii
+import gc
 import hashlib
 import json
 import os
@@ -25,11 +26,14 @@ async def join(about, sensor, boot, writer):
 
         url = await discover(about["id"], about["token"], seek["address"], seek["port"])
     host, port, path = address_of(url)
+    gc.collect()
     reader, stream = await asyncio.wait_for(asyncio.open_connection(host, port), _WITHIN_S)
     try:
         await asyncio.wait_for(_handshake(reader, stream, host, port, path, about["token"]), _WITHIN_S)
         link = WebSocket(reader, stream, writer)
+        gc.collect()
         await link.send(_hello, about, sensor, boot)
+        gc.collect()
         return link, await asyncio.wait_for(link.receive(), _WITHIN_S)
     except BaseException:
         stream.close()

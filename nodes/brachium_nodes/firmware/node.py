@@ -36,7 +36,7 @@ class Node:
         self._writer = Writer(max(18 * configuration["batch"] + 128, 512), ROOM)
         self._waiting = asyncio.Event()
         batches.wake = self._waiting.set
-        self._link = None
+        self._link = self._failure = None
         self._heard = 0
         self._empty = False
 
@@ -70,7 +70,7 @@ class Node:
             except Refused as refused:
                 print("refused:", refused)
                 wait = longest if refused.wait_s is None else int(refused.wait_s * 1000)
-            except (OSError, EOFError, ValueError, asyncio.TimeoutError) as error:
+            except (OSError, EOFError, ValueError, MemoryError, asyncio.TimeoutError) as error:
                 print("no connection:", repr(error))
             gc.collect()
             if self._empty:
@@ -82,30 +82,29 @@ class Node:
 
     async def _converse(self):
         await self._wifi.join()
+        gc.collect()
         import joining
 
-        link, message = await joining.join(self._about, self._sensor, self._boot, self._writer)
+        link, said = await joining.join(self._about, self._sensor, self._boot, self._writer)
         joining = None
         for name in ("joining", "discovery"):
             sys.modules.pop(name, None)
         tasks = ()
         try:
-            said = read_map(message)
-            if said.get("m") == "refused/1":
-                raise Refused(said)
-            if said.get("m") != "welcome/1":
-                raise OSError("a gateway says welcome, not %r" % said.get("m"))
-            print("joined as", said.get("seg"), "of", said.get("sub"))
+            said = self._welcomed(read_map(said))
             self._link, self._heard = link, time.ticks_ms()
             self._batches.keeping = self._batches.connected = True
-            tasks = [asyncio.create_task(work(link)) for work in (self._send, self._receive, self._tell)]
-            while not any(task.done() for task in tasks) and not self._empty:
+            self._failure = None
+            tasks = [
+                asyncio.create_task(self._until_it_fails(work, link))
+                for work in (self._send, self._receive, self._tell)
+            ]
+            while self._failure is None and not self._empty:
                 await asyncio.sleep_ms(_LOOK_MS)
                 if link.stuck_ms() > _STALLED_MS or self._silent_ms() > _STALLED_MS:
                     raise OSError("the gateway has fallen silent")
-            for task in tasks:
-                if task.done():
-                    await task
+            if self._failure is not None:
+                raise self._failure
             await self._cancel(tasks)
             await self._say_bye(link)
         finally:
@@ -114,10 +113,24 @@ class Node:
             self._batches.lost_connection()
             link.close()
 
+    async def _until_it_fails(self, work, link):
+        try:
+            await work(link)
+        except (OSError, EOFError, MemoryError) as error:
+            self._failure = error
+
     async def _cancel(self, tasks):
         for task in tasks:
             task.cancel()
         await asyncio.sleep_ms(0)  # each gives back what it holds
+
+    def _welcomed(self, said):
+        """Raise what the gateway's first message is, if it is no welcome; keep nothing of it."""
+        if said.get("m") == "refused/1":
+            raise Refused(said)
+        if said.get("m") != "welcome/1":
+            raise OSError("a gateway says welcome, not %r" % said.get("m"))
+        print("joined as", said.get("seg"), "of", said.get("sub"))
 
     def _silent_ms(self):
         return time.ticks_diff(time.ticks_ms(), self._heard)
@@ -158,20 +171,26 @@ class Node:
     async def leave(self):
         """Say goodbye, so that what was lost at the end is counted too."""
         if self._link is not None:
+            self._link.free()
             await self._say_bye(self._link)
 
     async def _say_bye(self, link):
-        self._batches.close()
-        batch = self._batches.next()
-        while batch is not None:
-            await asyncio.wait_for(link.send(self._batches.fill, batch), 2)
-            batch = self._batches.next()
-        await asyncio.wait_for(link.send(self._bye), 2)
+        batches = self._batches
+        batches.close()
         try:
+            batch = batches.next()
+            while batch is not None:
+                await asyncio.wait_for(link.send(batches.fill, batch), 2)
+                batches.sent(batch)
+                batch = batches.next()
+            await asyncio.wait_for(link.send(self._bye), 2)
             while True:
                 await asyncio.wait_for(link.receive(), 2)
         except (OSError, EOFError, asyncio.TimeoutError):
             pass
+        print(
+            "sent %d, dropped %d, next %d" % (batches.delivered, batches.dropped, self._sensor.clock.number)
+        )
 
     def _clock_answer(self, writer, number, came):
         writer.begin(3, "clock/1")

@@ -45,6 +45,10 @@ class WebSocket:
             await self._stream.drain()
             self._sending = None
 
+    def free(self):
+        """Take that whoever was sending is gone, as after an interruption."""
+        self._lock = asyncio.Lock()
+
     def stuck_ms(self):
         """Return for how long the message that is being sent has waited to go out."""
         return 0 if self._sending is None else time.ticks_diff(time.ticks_ms(), self._sending)

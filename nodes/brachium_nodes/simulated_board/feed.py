@@ -16,7 +16,7 @@ class Feed:
     def __init__(self):
         about = board.SETTINGS["feed"]
         self._file = open(about["path"], "rb")
-        self._last = self._file.seek(0, 2) // SAMPLE - 1
+        self._last = -1
         self._start_us, self._period_ns = about["start_us"], about["period_ns"]
         self.rate_hz = about["rate_hz"]
         self._sample = bytearray(SAMPLE)
@@ -31,6 +31,8 @@ class Feed:
 
     def sample(self, number):
         """Return 18 bytes, valid until the next call."""
+        if number > self._last:
+            self._last = self._file.seek(0, 2) // SAMPLE - 1  # the file may have grown
         self._file.seek(SAMPLE * max(0, min(number, self._last)))
         self._file.readinto(self._sample)
         return self._sample
