@@ -27,6 +27,7 @@ from sensor import Sensor
 
 def start():
     """Run the node until its battery is empty or somebody interrupts it over the serial line."""
+    machine.freq(160_000_000)  # an ESP8266 starts with half of it
     pins, wired, wifi = about.pop("i2c"), about.pop("battery"), about.pop("wifi")
     scl, sda = machine.Pin(pins["scl"]), machine.Pin(pins["sda"])
     if pins["id"] < 0:
