@@ -8,6 +8,7 @@ import numpy.typing as npt
 
 from brachium_body.segments import Segment
 from brachium_fusion.best_material import Material, TimedSpan
+from brachium_fusion.field_wander import told_of, wandering
 from brachium_fusion.motion_record import MotionRecord
 from brachium_fusion.pipeline import Pipeline
 from brachium_fusion.pose import POSES, Alignment
@@ -130,8 +131,16 @@ def output_times(capture: Capture, rate_hz: float | None) -> Floats:
 
 
 def solve(capture: Capture, settings: Settings, times_s: Floats) -> tuple[Pipeline, Alignment | None]:
-    """Return the pipeline after all samples, its skeletons waiting in it, and the alignment that was used."""
+    """Return the pipeline after all samples, its skeletons waiting in it, and the alignment that was used.
+
+    Where movement ties sensors to each other, magnetometers in a field that wanders are set aside.
+    """
     alignment = _alignment(capture, settings)
+    tied = {} if alignment is None else alignment.joints
+    away = wandering(material(capture)) if settings.magnetometer and settings.binds and tied else []
+    if away:
+        settings = replace(settings, magnetometer=False)
+        alignment = told_of(_alignment(capture, settings), away)
     pipeline = Pipeline(settings)
     subject = pipeline.subject(SUBJECT)
     _begin(subject, capture, nanoseconds(times_s).tolist())
