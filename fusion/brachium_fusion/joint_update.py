@@ -24,11 +24,14 @@ CENTRE_SD_PER_RATE = 0.004
 SPEED_TIME_S = 1.0
 """For how long its velocity stays alike."""
 AXIS_SD = radians(3.0)
-AXIS_TIME_S = 5.0
+AXIS_TURN, AXIS_TIME_S = 5.0, 60.0
+"""rad, s: what is wrong with the axes stays as it is while the joint does; an arm that hangs at rest must not
+take its heading from a tenth of a degree."""
 SHARED_HEADING_SD = radians(20.0)
 """Of the heading between two magnetometers indoors, where iron turns the field along the arm."""
-SHARED_HEADING_TIME_S = 60.0
-"""It stays as wrong as it is while the arm stays where it is."""
+SHARED_HEADING_TIME_S = 300.0
+"""It stays as wrong as it is while the person stays about where they are: correlated errors of this time
+count as white noise of twice its product with their variance."""
 STILL_RATE = radians(2.0)
 """rad/s, mean over an interval: slower is rest, once it lasted."""
 STILL_S = 0.8
@@ -135,13 +138,13 @@ def constrain(state: JointState, joint: Joint, gyr: Floats, shared: float | None
     told = _Told()
     _agree(told, state, gyr)
     if joint.has_axes:
-        _hold_axes(told, state, joint)
+        _hold_axes(told, state, joint, gyr)
     for i in (0, 1):
         if state.still_s[i] > STILL_S:  # what the gyroscope of a sensor at rest reads is its bias
             variance = STILL_SD**2 * STILL_TIME_S / NODE_S
             told.part(3, gyr[i] - state.gyro_bias[i], variance)[:, i, 6:9] = _UNITS[0]
     if shared is not None:
-        row = told.part(1, -shared, SHARED_HEADING_SD**2 * SHARED_HEADING_TIME_S / NODE_S)
+        row = told.part(1, -shared, 2.0 * SHARED_HEADING_SD**2 * SHARED_HEADING_TIME_S / NODE_S)
         row[0, 0, 2], row[0, 1, 2] = -1.0, 1.0
     lengths = told.solve(state)
     walks, axes = state.noise
@@ -174,12 +177,15 @@ def _agree(told: _Told, state: JointState, gyr: Floats) -> None:
     told.variance[3:6] = SPEED_SD**2 * SPEED_TIME_S / NODE_S
 
 
-def _hold_axes(told: _Told, state: JointState, joint: Joint) -> None:
+def _hold_axes(told: _Told, state: JointState, joint: Joint, gyr: Floats) -> None:
     """Two axes enclose a constant angle; of a hinge they are one."""
     assert joint.axis_a is not None
     assert joint.axis_b is not None
     a, b = state.attitude[0] @ joint.axis_a, state.attitude[1] @ joint.axis_b
-    variance = state.noise[1] * AXIS_SD**2 * AXIS_TIME_S / NODE_S
+    rate_a, rate_b = (state.attitude @ gyr[:, :, None])[:, :, 0]
+    bending = rate_b - rate_a
+    looks = NODE_S * (sqrt(float(bending @ bending)) / AXIS_TURN + 1.0 / AXIS_TIME_S)
+    variance = state.noise[1] * AXIS_SD**2 / looks
     if joint.axes == 2:
         row = told.part(1, sin(joint.carrying_rad) - float(a @ b), variance)
         normal = skew(a) @ b
