@@ -1,7 +1,6 @@
 """Runs the wearables' own firmware on this host: MicroPython, and an emulated board on an emulated person."""
 
 import json
-import signal
 import subprocess
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass, field
@@ -91,9 +90,8 @@ class FirmwareNode:
         return (self.folder / "serial.txt").read_text("utf-8", "replace")
 
     def stop(self) -> FirmwareReport:
-        """Interrupt it over the serial line; it says bye. Raises RuntimeError when it failed."""
-        if self.process.poll() is None:
-            self.process.send_signal(signal.SIGINT)
+        """Interrupt it as over the serial line; it says bye. Raises RuntimeError when it failed."""
+        (self.folder / "stop").touch()
         try:
             code = self.process.wait(ENDS_WITHIN_S)
         except subprocess.TimeoutExpired:
@@ -130,6 +128,7 @@ def prepare(
     board = board or BoardSettings()
     folder.mkdir(parents=True, exist_ok=True)
     clock, rate_hz = wearer.clocks[segment], wearer.settings.rate_hz
+    (folder / "stop").unlink(missing_ok=True)
     (folder / "samples.bin").write_bytes(feed(wearer, segment, board, 0, int(seconds * rate_hz)))
     about = {
         "feed": {

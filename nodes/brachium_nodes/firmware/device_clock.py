@@ -63,6 +63,13 @@ class SampleClock:
         self._newest = taken if taken > self._newest else self._newest + 1
         return self._newest
 
+    def due_between(self, before, after):
+        """Return whether a sample is taken between two readings of the clock."""
+        if self._phase is None:
+            return False
+        first, last = (((t - self._at) << FRACTION) - self._phase for t in (before, after))
+        return first // self.period != last // self.period
+
     def skip(self, now):
         """Take that all samples up to now are lost; return how many those were."""
         if self._phase is None:

@@ -2,6 +2,7 @@
 
 import gc
 import json
+import os
 
 import utime
 
@@ -20,6 +21,15 @@ def note_heap():
 def true_us():
     """Return the host's monotonic clock in us."""
     return utime.ticks_us()
+
+
+def stopped():
+    """Return whether the host wants an end: by a file, as a signal may come while memory is collected."""
+    try:
+        os.stat("stop")
+    except OSError:
+        return False
+    return True
 
 
 def report():

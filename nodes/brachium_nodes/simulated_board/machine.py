@@ -41,6 +41,8 @@ class WDT:
         now = board.true_us()
         board.COUNTS["longest_unfed_ms"] = max(board.COUNTS["longest_unfed_ms"], (now - self._fed) // 1000)
         self._fed = now
+        if board.stopped():
+            raise KeyboardInterrupt  # as Ctrl-C on the serial line
 
 
 def freq(hz):
