@@ -119,6 +119,14 @@ def _frames(
     along = _relative(motion, found) @ axis_b
     beyond = np.arctan2(-(along @ x0), along @ y0)  # flexion beyond that of the pose
     flexion = _flexion_in_pose(pose, y0, x0, beyond, found.axis_b_sd)
+    if pose.hanging:
+        # the upper arm leans and the turning axis lies beside the forearm's length, each by its own doubt
+        share = found.axis_b_sd**2 / (found.axis_b_sd**2 + VERTICAL_SD**2)
+        beside = share * (flexion - _flexion_if_vertical(pose, y0, x0))
+        flexion_axis = rotation.rotate(rotation.inverse(upper_from_forearm), axis_a)
+        axis_b = rotation.rotate(rotation.from_rotation_vector(beside * flexion_axis), axis_b)
+        y0, x0 = _beside(axis_a, rotation.rotate(upper_from_forearm, axis_b))
+        along = _relative(motion, found) @ axis_b
     y = cos(flexion) * y0 + sin(flexion) * x0
     upper_from_sensor = rotation.from_matrix(np.stack([np.cross(y, axis_a), y, axis_a]))
     seen = rotation.rotate(rotation.inverse(upper_from_forearm), axis_a)
@@ -172,8 +180,7 @@ def _flexion_in_pose(pose: ElbowPose, y0: Floats, x0: Floats, beyond: Floats, ax
     """Return the flexion held in the pose: the weighted mean of what is known of it."""
     values, weights = [pose.flexion], [pose.flexion_sd**-2]
     if pose.hanging:
-        up = rotation.rotate(rotation.inverse(pose.upper_sensor), np.array([0.0, 0.0, 1.0]))
-        seen = float(np.arctan2(up @ x0, up @ y0))  # flexion if the upper arm is vertical
+        seen = _flexion_if_vertical(pose, y0, x0)
         sd = float(np.hypot(VERTICAL_SD, axis_b_sd))
         # far from what the pose states, the statement is doubted: it was not held
         doubt = max(0.0, abs(seen - pose.flexion) / np.hypot(sd, pose.flexion_sd) - 2.0)
@@ -186,6 +193,12 @@ def _flexion_in_pose(pose: ElbowPose, y0: Floats, x0: Floats, beyond: Floats, ax
         weight = STRAIGHTEST_SD**-2
         flexion += short * weight / (weight + sum(weights))
     return flexion
+
+
+def _flexion_if_vertical(pose: ElbowPose, y0: Floats, x0: Floats) -> float:
+    """Return the flexion held in the pose if the upper arm is vertical in it."""
+    up = rotation.rotate(rotation.inverse(pose.upper_sensor), np.array([0.0, 0.0, 1.0]))
+    return float(np.arctan2(up @ x0, up @ y0))
 
 
 def _merit(
