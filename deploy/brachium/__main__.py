@@ -12,6 +12,7 @@ COMMANDS: dict[str, str] = {
     "play": "a capture folder or a recording, as if it were being measured now",
     "fuse": "fusion: samples to skeletons",
     "calibrate": "calibrate a person's sensors in a running network: it says what to do",
+    "wear-check": "which sensor sits where, and whether it is turned: it says what to change",
     "view": "the live view",
     "record": "the recorder",
     "monitor": "the network in the terminal: nodes, rates, loss, latency",
@@ -40,13 +41,12 @@ def main(argv: list[str] | None = None) -> int:
         return 2
     from brachium.shell import run_command
 
-    return run_command(
-        words[0], COMMANDS[words[0]], import_module(f"brachium.commands.{words[0]}"), words[1:]
-    )
+    module = import_module(f"brachium.commands.{words[0].replace('-', '_')}")
+    return run_command(words[0], COMMANDS[words[0]], module, words[1:])
 
 
 def _help() -> str:
-    rows = "\n".join(f"  {name:<10}{text}" for name, text in COMMANDS.items())
+    rows = "\n".join(f"  {name:<12}{text}" for name, text in COMMANDS.items())
     return (
         "usage: brachium COMMAND [options]\n\n"
         "Upper-limb motion tracking with small wireless inertial sensors.\n\n"

@@ -40,6 +40,20 @@ def whole(low: int, high: int) -> Callable[[str], int]:
     return parsed
 
 
+def span_s(text: str) -> tuple[float, float]:
+    """Return the two times of FROM:TO in s, at least a second apart."""
+    first, _, last = text.partition(":")
+    try:
+        from_s, to_s = real(0.0, LONGEST_S)(first), real(0.0, LONGEST_S)(last)
+    except ArgumentTypeError:
+        from_s = to_s = 0.0
+    if to_s - from_s < 1.0:
+        raise ArgumentTypeError(
+            f"{text!r} cannot be used: write FROM:TO in seconds, a second or more, as in 4:7.5"
+        )
+    return from_s, to_s
+
+
 def sha256(text: str) -> str:
     """Return `text` if it is a SHA-256 in lower-case hex."""
     if not re.fullmatch("[0-9a-f]{64}", text):

@@ -66,7 +66,7 @@ def test_each_command_explains_itself_with_an_example(name: str, capsys: pytest.
 
 @pytest.mark.parametrize("name", COMMANDS)
 def test_examples_have_options_that_are_there(name: str):
-    module = import_module(f"brachium.commands.{name}")
+    module = import_module(f"brachium.commands.{name.replace('-', '_')}")
     lines = re.findall(rf"^ *brachium {name}\b(.*)$", module.__doc__ or "", re.MULTILINE)
     assert lines
     for line in lines:
@@ -160,6 +160,7 @@ BAD_NUMBERS = {
     "router": {"--port": ("0", "x"), "--max-sessions": ("0",)},
     "bench": {"--arms": ("-1",)},
     "solve": {"--rate": ("nan", "0")},
+    "wear-check": {"--hang": ("nan:2", "3:1", "4", "1:1.5"), "--bend": ("x:y",)},
     "compare": {"--from": ("nan",), "--to": ("inf",)},
 }
 
