@@ -78,7 +78,7 @@ class FirmwareRun:
             StallingRelay(self.relay_port, self.gateway_port) as relay,
         ):
             heard = _Heard(bus)
-            nodes = {s: FirmwareNode.start(self._prepare(s), made) for s in WORN}
+            nodes: dict[Segment, FirmwareNode] = {s: FirmwareNode.start(self._prepare(s), made) for s in WORN}
             try:
                 if self.faults:
                     self._wait(lambda: all("this node's token" in n.said() for n in nodes.values()), "401")
@@ -87,7 +87,9 @@ class FirmwareRun:
                 self._wait(lambda: len(heard.joined()) == len(WORN), "the nodes' welcome")
                 self._pass(relay, stop)
             finally:
-                reports = dict(zip(nodes, stop_all(nodes.values()), strict=True))
+                reports: dict[Segment, FirmwareReport] = dict(
+                    zip(nodes, stop_all(nodes.values()), strict=True)
+                )
             refused = sum("this node's token" in node.said() for node in nodes.values())
             stop.wait(1.0)
             heard.drain()

@@ -206,14 +206,15 @@ def _begin(subject: Subject, capture: Capture, instants: Sequence[int]) -> None:
 
 def _alignment(capture: Capture, settings: Settings) -> Alignment | None:
     """Return what the calibration spans give, or None when there are none: filters run up to their end."""
-    spans = _timed(capture)
+    spans = list(_timed(capture))
     if not any(span.kind in POSES for span in spans):
         return None
     end_s = max(span.to_s for span in spans)
     if len(spans) > 1 or _loose(capture):
         whole = TimedSpan(kind="free", from_s=spans[0].to_s, to_s=spans[0].to_s + FREE_S)
         end_s = max(end_s, whole.to_s)
-        spans += (whole,) if leaves_open([span.kind for span in spans]) else ()
+        if leaves_open([span.kind for span in spans]):
+            spans.append(whole)
     subject = Subject(replace(settings, joints=False), lambda _: None)
     times = output_times(capture, None)
     wanted = times[times <= end_s + 1e-9]

@@ -143,7 +143,8 @@ def _joined(batches: list[Samples], zero_ns: int) -> tuple[Series, npt.NDArray[n
     _, order = np.unique(times, return_index=True)
     blocks = {name: _block(batches, name) for name in ("gyr", "acc", "mag", "quat")}
     chosen = {name: None if block is None else block[order] for name, block in blocks.items()}
-    return Series(time_s=1e-9 * (times[order] - zero_ns), rate_hz=1.0, **chosen), numbers[order]
+    time_s = (times[order] - zero_ns).astype(np.float64) * 1e-9
+    return Series(time_s=time_s, rate_hz=1.0, **chosen), numbers[order]
 
 
 def _block(batches: list[Samples], name: str) -> Floats | None:

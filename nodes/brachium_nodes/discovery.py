@@ -50,11 +50,11 @@ class _Answering(asyncio.DatagramProtocol):
         """Take the way back."""
         self._transport = cast(asyncio.DatagramTransport, transport)
 
-    def datagram_received(self, data: bytes, address: tuple[str | int, ...]) -> None:
+    def datagram_received(self, data: bytes, addr: tuple[str | int, ...]) -> None:
         """Answer whoever asks for a gateway that is his."""
         said = answer(data, self._url, self._token_sha256_of)
         if said is not None and self._transport is not None:
-            self._transport.sendto(said, address)
+            self._transport.sendto(said, addr)
 
 
 @asynccontextmanager

@@ -44,10 +44,14 @@ class FirmwareWearer:
         with TemporaryDirectory(prefix="brachium-") as place:
             made = await asyncio.to_thread(build, Path(place) / "build")
             timeline.start_ns = time.monotonic_ns() + round(1e9 * STARTS_S)
-            folders = {segment: Path(place) / segment for segment in self.wearer.segments}
+            folders: dict[Segment, Path] = {
+                segment: Path(place) / segment for segment in self.wearer.segments
+            }
             for segment, folder in folders.items():
                 await asyncio.to_thread(self._prepare, segment, folder, timeline.start_ns // 1000)
-            nodes = {segment: FirmwareNode.start(folder, made) for segment, folder in folders.items()}
+            nodes: dict[Segment, FirmwareNode] = {
+                segment: FirmwareNode.start(folder, made) for segment, folder in folders.items()
+            }
             tasks = [asyncio.create_task(beside())]
             tasks += [
                 asyncio.create_task(self._go_on_writing(segment, folder, timeline))
