@@ -60,7 +60,10 @@ def solve(
     }
     time_s, rate_hz = grid(series)
     tracked = {s: _tracked(on_grid(one, time_s), rate_hz) for s, one in series.items()}
-    best.parts["orientation"] = "offline VQF for tilt, robust heading from the field of the whole recording"
+    heading = any(one.magnetometer for one in tracked.values())
+    best.parts["orientation"] = "offline VQF for tilt" + (
+        ", robust heading from the field of the whole recording" if heading else ", no magnetometer"
+    )
     spans = rows_of_spans(material, tracked, time_s, rate_hz)
     best.alignment = _align(material, tracked, spans, rate_hz, best)
     solutions = [
@@ -107,8 +110,8 @@ def _align(
             world_from_sensor=one.world_from_sensor,
             magnetometer=one.magnetometer,
             nominal_mounting=None if mountings[s] is None else np.array(mountings[s]),
-            gyr=one.samples.gyr,
-            acc=one.samples.acc,
+            gyr=one.samples.gyr if one.raw else None,
+            acc=one.samples.acc if one.raw else None,
         )
         for s, one in tracked.items()
     }

@@ -81,7 +81,7 @@ def solve_arm(
         _bind("elbow", knowledge, upper, forearm, tracked, rate_hz, solution)
     if alignment is not None and pose is not None and knowledge.model is not None:
         _smooth_shoulder(knowledge, tracked, (upper, forearm), pose, rate_hz, solution)
-        if knowledge.trunk is None and solution.shift is not None:
+        if "sternum" not in tracked and solution.shift is not None:
             solution.warnings.append(NOT_OBSERVABLE_WITHOUT_STERNUM)
     if knowledge.wrist is not None:
         _bind("wrist", knowledge, forearm, hand, tracked, rate_hz, solution)

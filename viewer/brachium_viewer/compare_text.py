@@ -29,7 +29,8 @@ def text(comparison: Comparison) -> str:
 
 
 _HEAD = (
-    f"{'':<44}{'bias':>10}{'95 % limits of agreement':>26}{'r':>8}{'ICC(2,1)':>10}{'CCC':>8}{'p':>9}{'n':>9}"
+    f"{'':<44}{'bias':>10}  {'95 % limits of agreement':>30}"
+    f"{'r':>8}{'ICC(2,1)':>10}{'CCC':>8}{'p':>9}{'n':>9}"
 )
 
 
@@ -51,7 +52,7 @@ def _agreement(name: str, e: Agreement) -> str:
     bias, low, high = (_shown(name, x) for x in (e.bias, *e.limits))
     limits = f"{low:.3g} to {high:.3g}" + (f" (+-{e.limits_margin:.2g})" if e.limits_margin else "")
     return (
-        f"{name:<44}{bias:>10.3g}{limits:>26}"
+        f"{name:<44}{bias:>10.3g}  {limits:>30}"
         f"{_of(e.r):>8}{_of(e.icc):>10}{_of(e.ccc):>8}{_probability(e.wilcoxon_p):>9}{e.n:>9}"
     )
 
