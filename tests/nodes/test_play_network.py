@@ -170,7 +170,9 @@ def test_a_recording_goes_through_a_gateway_with_its_own_times(gateway, listener
     assert then.keys() == now.keys()
     shifts = {k: m.time_ns - then[k] for k, m in now.items()}
     middle = np.median(list(shifts.values()))
-    assert all(abs(shifts[k] - middle) <= 2 * now[k].uncertainty_ns + 1000 for k in now)
+    # The middle is another batch's, perhaps of the other node's clock: each is off by its own uncertainty.
+    widest = max(m.uncertainty_ns for m in now.values())
+    assert all(abs(shifts[k] - middle) <= now[k].uncertainty_ns + widest + 1000 for k in now)
 
 
 def batches(messages: Iterable[tuple[str, bytes]]) -> Iterator[tuple[str, SampleBatch]]:
