@@ -126,8 +126,8 @@ def many_arms(arms: int, window_s: float) -> ManyArms:
     with TemporaryDirectory() as folder, Processes() as processes, helpers() as beside:
         logs = Path(folder)
         processes.start("router", ["router", "--room", room, "--port", str(port)], stderr=logs / "router")
-        # Following a shoulder costs a quarter of a millisecond at each instant: too much for a hundred.
-        words = ["fuse", "--no-shoulder", "--no-keep", "--room", room, "--endpoint", endpoint]
+        # A heading of our own and a shoulder that is followed are too much for a hundred arms on one core.
+        words = ["fuse", "--filter", "vqf", "--no-keep", "--room", room, "--endpoint", endpoint]
         fuse = processes.start("fuse", words, stderr=logs / "fuse")
         with Bus.open(endpoint) as bus:
             inbox = bus.subscribe(keys.subjects(room, "skeleton/*"), 1 << 20)
