@@ -1,8 +1,9 @@
 """What is promised, and how each promise is measured: a table of figures with their targets."""
 
-from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any
+
+from brachium.node_promises import NODE_PROOFS
+from brachium.proofs import Promise, Proof, figure
 
 BROAD = {
     "broad_02_undisturbed_slow_rotation_B": 1.38,
@@ -12,43 +13,6 @@ BROAD = {
 }
 """What VQF reaches online on these captures: RMSE of the whole angle where there is movement, deg."""
 BROAD_FACTOR = 1.1
-
-Take = Callable[[dict[str, Any]], float | None]
-
-
-@dataclass(frozen=True, kw_only=True)
-class Promise:
-    """One figure: what it is, where it stands in the command's JSON, and what it must not exceed."""
-
-    name: str
-    unit: str
-    take: Take
-    at_most: float | None = None
-    """None: stated, with no target."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Proof:
-    """One command whose JSON holds figures; `{data}` and `{folder}` in its words are filled in."""
-
-    name: str
-    commands: tuple[tuple[str, ...], ...]
-    """Run in this order; the last one's JSON is read."""
-    promises: tuple[Promise, ...]
-    needs_data: bool = False
-
-
-def _at(*path: str) -> Take:
-    def take(figures: Any) -> float | None:
-        for step in path:
-            figures = figures.get(step) if isinstance(figures, dict) else None
-        return None if figures is None else float(figures)
-
-    return take
-
-
-def _figure(name: str, unit: str, *path: str, at_most: float | None = None) -> Promise:
-    return Promise(name=name, unit=unit, take=_at(*path), at_most=at_most)
 
 
 def _loss_difference(figures: dict[str, Any]) -> float:
@@ -65,11 +29,11 @@ def _demo(level: str, elbow_deg: float, wrist_mm: float, nodes: str = "emulated"
         commands=(("demo", *words, "--out", "{folder}/demo"),),
         promises=(
             Promise(name="counts off the injected", unit="samples", take=_loss_difference, at_most=0),
-            _figure("elbow flexion RMSE", "deg", *arm, "rmse_deg", "elbow_flexion", at_most=elbow_deg),
-            _figure("wrist position RMSE", "mm", *arm, "rmse_mm", "wrist", at_most=wrist_mm),
-            _figure("skeleton rate", "Hz", *arm, "rate_hz"),
-            _figure("latency, 99 %", "ms", *arm, "latency_p99_ms"),
-            _figure(
+            figure("elbow flexion RMSE", "deg", *arm, "rmse_deg", "elbow_flexion", at_most=elbow_deg),
+            figure("wrist position RMSE", "mm", *arm, "rmse_mm", "wrist", at_most=wrist_mm),
+            figure("skeleton rate", "Hz", *arm, "rate_hz"),
+            figure("latency, 99 %", "ms", *arm, "latency_p99_ms"),
+            figure(
                 "start to first skeleton",
                 "s",
                 "first_skeleton_s",
@@ -85,9 +49,9 @@ def _repeat() -> Proof:
         name="solve-repeats-live",
         commands=(demo, ("solve", "{folder}/demo/recording.mcap", "--json")),
         promises=(
-            _figure("skeletons compared", "1", "live_compared"),
-            _figure("largest angle apart", "rad", "live_angle_rad", at_most=1e-9),
-            _figure("largest position apart", "m", "live_position_m", at_most=1e-9),
+            figure("skeletons compared", "1", "live_compared"),
+            figure("largest angle apart", "rad", "live_angle_rad", at_most=1e-9),
+            figure("largest position apart", "m", "live_position_m", at_most=1e-9),
         ),
     )
 
@@ -102,7 +66,7 @@ def _broad(capture: str, filter_name: str, known: float | None) -> Proof:
             ("solve", f"{{data}}/{capture}", "--filter", filter_name, "--out", result),
             ("compare", result, truth, "--json"),
         ),
-        promises=(_figure("orientation RMSE", "deg", *error, at_most=target),),
+        promises=(figure("orientation RMSE", "deg", *error, at_most=target),),
         needs_data=True,
     )
 
@@ -110,7 +74,7 @@ def _broad(capture: str, filter_name: str, known: float | None) -> Proof:
 def _bench() -> Proof:
     one, many = ("one_arm", "5"), ("many_arms",)
     to_skeleton = tuple(
-        _figure(
+        figure(
             f"sensor to skeleton, {batch} samples a packet, {p} %",
             "ms",
             *("one_arm", batch, f"sensor_to_skeleton_p{p}_ms"),
@@ -122,15 +86,15 @@ def _bench() -> Proof:
         name="bench",
         commands=(("bench", "--json"),),
         promises=(
-            _figure("one arm: fusion, of a core", "1", *one, "fusion_cpu", at_most=0.10),
-            _figure("one arm: a bare relay, of a core", "1", *one, "relay_cpu"),
-            _figure("gateway to skeleton, 99 %", "ms", *one, "latency_p99_ms", at_most=35.0),
+            figure("one arm: fusion, of a core", "1", *one, "fusion_cpu", at_most=0.10),
+            figure("one arm: a bare relay, of a core", "1", *one, "relay_cpu"),
+            figure("gateway to skeleton, 99 %", "ms", *one, "latency_p99_ms", at_most=35.0),
             *to_skeleton,
-            _figure("start to first skeleton", "s", *one, "first_skeleton_s", at_most=5.0),
-            _figure("100 arms: ticks without a skeleton", "1", *many, "skeletons_missing", at_most=0),
-            _figure("100 arms: poses held or missing", "1", *many, "poses_not_measured", at_most=0),
-            _figure("100 arms: fusion, of a core", "1", *many, "fusion_cpu", at_most=0.25),
-            _figure("100 arms: a bare relay, of a core", "1", *many, "relay_cpu"),
+            figure("start to first skeleton", "s", *one, "first_skeleton_s", at_most=5.0),
+            figure("100 arms: ticks without a skeleton", "1", *many, "skeletons_missing", at_most=0),
+            figure("100 arms: poses held or missing", "1", *many, "poses_not_measured", at_most=0),
+            figure("100 arms: fusion, of a core", "1", *many, "fusion_cpu", at_most=0.25),
+            figure("100 arms: a bare relay, of a core", "1", *many, "relay_cpu"),
         ),
     )
 
@@ -174,29 +138,6 @@ def _accuracy(name: str, tables: tuple[str, ...]) -> Proof:
     )
 
 
-def _worst(name: str) -> Take:
-    def take(figures: dict[str, Any]) -> float:
-        return max(float(found[name]) for found in figures["samples"].values())
-
-    return take
-
-
-def _firmware(run: str) -> Proof:
-    return Proof(
-        name=f"firmware-{run}",
-        commands=(("firmware", "--run", run, "--seconds", "60", "--json"),),
-        promises=(
-            Promise(name="unexplained", unit="samples", take=_worst("unexplained"), at_most=0),
-            Promise(name="sent again, not marked late", unit="samples", take=_worst("unmarked"), at_most=0),
-            Promise(name="lost", unit="samples", take=_worst("lost"), at_most=0 if run == "quiet" else None),
-            Promise(name="late", unit="samples", take=_worst("late")),
-            Promise(name="rate off", unit="%", take=_worst("rate_off_percent"), at_most=0.1),
-            _figure("memory of the chip's 36", "K", "heap_peak_k", at_most=30),
-            _figure("skeletons", "1", "skeletons"),
-        ),
-    )
-
-
 PROOFS: tuple[Proof, ...] = (
     _demo("typical", 3.5, 30.0),
     _demo("ideal", 1.5, 15.0),
@@ -206,6 +147,5 @@ PROOFS: tuple[Proof, ...] = (
     *(_broad(capture, "complementary", None) for capture in BROAD),
     *(_accuracy(name, tables) for name, tables in ACCURACY.items()),
     _bench(),
-    _firmware("quiet"),
-    _firmware("faults"),
+    *NODE_PROOFS,
 )

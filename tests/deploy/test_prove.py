@@ -5,7 +5,8 @@ import pytest
 
 from brachium.__main__ import COMMANDS
 from brachium.commands import prove
-from brachium.promises import PROOFS, Promise, Proof
+from brachium.promises import PROOFS
+from brachium.proofs import Promise, Proof
 
 
 def promise(at_most: float | None) -> Promise:

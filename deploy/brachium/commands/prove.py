@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING
 from brachium.shell import Failed, Usage, as_json
 
 if TYPE_CHECKING:
-    from brachium.promises import Promise, Proof
+    from brachium.proofs import Promise, Proof
 
 LONGEST_S = 1800.0
 
