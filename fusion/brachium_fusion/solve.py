@@ -25,7 +25,7 @@ from brachium_fusion.solve_terms import (
     SolveReport,
     SolveSettings,
 )
-from brachium_fusion.zhou_recording import ZhouName, solve_zhou
+from brachium_fusion.zhou_recording import NEEDS, ZhouName, solve_zhou
 from brachium_wire import capture as captures
 from brachium_wire import recording, table
 
@@ -90,6 +90,8 @@ def _best(
 ) -> Outcome:
     one_arm = solve_arm if zhou is None else partial(solve_zhou, zhou)
     found = best.solve(material, chosen, times_s, one_arm)
+    if zhou is not None and not any(part.startswith("shoulder") for part in found.parts):
+        raise SolveError(f"--filter {zhou} {NEEDS}; no arm has both: give them, or choose another --filter")
     nothing = [NO_CALIBRATION] if found.alignment is None else []
     return Outcome(
         chosen=chosen,

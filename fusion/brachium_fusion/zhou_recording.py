@@ -23,6 +23,8 @@ Floats = npt.NDArray[np.float64]
 ZhouName = Literal["zhou", "zhou-printed"]
 ZHOU: tuple[ZhouName, ...] = get_args(ZhouName)
 
+NEEDS = "needs raw samples of upper arm and forearm, and a pose at the beginning"
+
 
 def solve_zhou(
     name: ZhouName,
@@ -43,10 +45,11 @@ def solve_zhou(
     upper, forearm, _ = arm_segments(side)
     if upper not in tracked and forearm not in tracked:
         return solution
+    part = f"shoulder_{side[0]}"
     knowledge = arm_knowledge(side, alignment, lengths, stated, [])
     raw = [tracked[s] for s in (upper, forearm) if s in tracked and tracked[s].raw]
     if alignment is None or pose is None or knowledge.model is None or len(raw) != 2:
-        solution.refused["zhou"] = "needs raw samples of upper arm and forearm, and a pose at the beginning"
+        solution.refused[part] = NEEDS
         return solution
     levers = {upper: knowledge.model.lever_upper, forearm: knowledge.model.lever_forearm}
     sensors = []
@@ -82,7 +85,7 @@ def solve_zhou(
     solution.shift = np.full((len(raw[0].world_from_sensor), 2, 3), np.nan)
     solution.shift[pose.first :, 0] = motion.shift_m - motion.shift_m[0]
     solution.shift[pose.first :, 1] = 0.5 * np.abs(motion.s_b - motion.s_b[0])
-    solution.parts["shoulder"] = f"Zhou et al. 2008, drift reset in each of {max(0, len(cycles) - 1)} cycles"
+    solution.parts[part] = f"Zhou et al. 2008, drift reset in each of {max(0, len(cycles) - 1)} cycles"
     return solution
 
 

@@ -4,9 +4,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from msgspec import structs
 
 from brachium_fusion.from_capture import ZERO_NS
-from brachium_fusion.solve import SolveSettings, run
+from brachium_fusion.solve import SolveError, SolveSettings, run
 from brachium_nodes.session import SessionArrays, session_arrays
 from brachium_nodes.wearer import WearerSettings
 from brachium_wire import capture
@@ -63,11 +64,16 @@ def test_corrected_sees_a_shrug_and_printed_does_not(session: SessionArrays, fol
     assert shift_error_mm(session, folder, "zhou-printed") > 40.0
 
 
-def test_one_sensor_is_refused_with_the_reason(folder: Path, tmp_path: Path):
-    other = tmp_path / "one"
-    other.mkdir()
-    for name in ("capture.toml", "forearm_l.csv"):
-        (other / name).write_text((folder / name).read_text())
-    report = run(SolveSettings(input=other, filter="zhou"))
-    assert "raw samples of upper arm and forearm" in report.refused["zhou"]
-    assert all(skeleton.shoulder_shift is None for skeleton in report.skeletons)
+def test_what_cannot_be_solved_is_refused_and_writes_nothing(folder: Path, tmp_path: Path):
+    whole = capture.load(folder)
+    unposed = structs.replace(whole.settings, calibration=CalibrationSpans())
+    for name, settings, segments in (
+        ("one", whole.settings, SEGMENTS[1:]),
+        ("no_pose", unposed, SEGMENTS),
+    ):
+        other = tmp_path / name
+        capture.write(other, settings, {s: whole.segments[s] for s in segments}, "csv")
+        out = tmp_path / f"{name}.csv"
+        with pytest.raises(SolveError, match="--filter zhou needs raw samples of upper arm and forearm"):
+            run(SolveSettings(input=other, filter="zhou", out=out))
+        assert not out.exists()
