@@ -16,6 +16,7 @@ import msgspec
 
 from brachium_wire import codec, messages, plausible, samples
 from brachium_wire.messages import Message
+from brachium_wire.sensor_records import SensorProgress
 from brachium_wire.topics import TOPICS
 
 HERE = Path(__file__).parent
@@ -238,7 +239,7 @@ def sections() -> dict[str, str]:
     for message in EXAMPLES:
         kind = type(message)
         out[tag_of(kind)] = f"{fields(kind)}\n\n{example(message)}"
-    for record in (messages.SensorCalibration, messages.SegmentPose):
+    for record in (messages.SensorCalibration, SensorProgress, messages.SegmentPose):
         out[record.__name__] = fields(record)
     return out
 

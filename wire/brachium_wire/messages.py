@@ -8,13 +8,15 @@ from typing import Any, Literal
 import msgspec
 
 from brachium_body.segments import Side
+from brachium_wire.sensor_records import CalibrationState as CalibrationState
+from brachium_wire.sensor_records import Keeper, SensorProgress
+from brachium_wire.sensor_records import SensorCalibration as SensorCalibration
+from brachium_wire.sensor_records import Vector as Vector
 
 Origin = Literal["worn", "emulated", "playback"]
 Quality = Literal["good", "held", "missing", "disturbed", "uncalibrated", "heading_assumed", "assumed"]
 Forward = Literal["sternum", "elbow", "facing", "mounting", "none"]
-CalibrationState = Literal["none", "waiting", "running", "done", "refused"]
 
-Vector = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
 
 
@@ -53,22 +55,6 @@ class SampleBatch(Message, frozen=True, kw_only=True, tag="imu/1"):
     """Sent again after an outage: for the record, too late for the live skeleton."""
 
 
-class SensorCalibration(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
-    """What turns raw samples into calibrated ones: gyr - gyro_bias; accel_scale * (acc - accel_bias);
-    mag_matrix (mag - mag_offset)."""
-
-    gyro_bias: Vector | None = None
-    """rad/s, taken off the angular rate."""
-    accel_scale: Vector | None = None
-    """Factor of each axis of the specific force, after the bias."""
-    accel_bias: Vector | None = None
-    """m/s^2, taken off the specific force."""
-    mag_offset: Vector | None = None
-    """uT, taken off the magnetic field (hard iron)."""
-    mag_matrix: tuple[Vector, Vector, Vector] | None = None
-    """Three rows, applied after the offset (soft iron)."""
-
-
 class Info(Message, frozen=True, kw_only=True, tag="info/1"):
     """What is known of the sensor on one segment (retained)."""
 
@@ -88,6 +74,8 @@ class Info(Message, frozen=True, kw_only=True, tag="info/1"):
     """Nominal segment_from_sensor; absent when nothing is known of how it is worn."""
     calibration: SensorCalibration = msgspec.field(name="cal", default_factory=SensorCalibration)
     """Sensor calibration that whoever uses the samples must apply."""
+    kept: Keeper = ""
+    """Who keeps the calibration: the node itself, or its gateway for it; empty when there is none."""
     magnetometer: bool = msgspec.field(name="mag", default=False)
     """Whether batches will carry a magnetic field."""
     orientation_only: bool = msgspec.field(name="ori", default=False)
@@ -198,6 +186,10 @@ class Calibration(Message, frozen=True, kw_only=True, tag="calibration/1"):
     """What a person should know, one line each."""
     refused: dict[str, str] = msgspec.field(default_factory=dict)
     """What could not be found, by name, and the reason: one line that says what to do."""
+    sensor: SensorProgress | None = None
+    """The sensor that is being calibrated by itself, or was last."""
+    sensors: dict[str, SensorCalibration] = msgspec.field(default_factory=dict)
+    """Sensor calibrations found here, by node: what gateways bring to the nodes."""
 
 
 class Session(Message, frozen=True, kw_only=True, tag="session/1"):

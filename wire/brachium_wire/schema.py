@@ -7,6 +7,10 @@ from functools import cache
 from msgspec.structs import fields
 
 from brachium_wire import messages
+from brachium_wire.sensor_records import SensorCalibration, SensorProgress
+
+RECORDS = (SensorCalibration, SensorProgress, messages.SegmentPose)
+"""What messages hold inside."""
 
 
 @cache
@@ -20,22 +24,21 @@ def text(kind: type[messages.Message]) -> str:
     parts = [f"MessagePack map, m = {tag!r}. Fields may be absent; unknown ones are to be ignored."]
     for record in wanted:
         parts += ["", f"{record.__name__}: {' '.join((inspect.getdoc(record) or '').split())}"]
-        notes = _notes(record.__name__)
+        notes = _notes(record)
         for f in fields(record):
             hint, note = notes.get(f.name, ("", ""))
             parts.append(f"  {f.encode_name}: {hint}" + (f"  {note}" if note else f"  {f.name}"))
-            inner = [getattr(messages, name) for name in ("SensorCalibration", "SegmentPose") if name in hint]
+            inner = [one for one in RECORDS if one.__name__ in hint]
             wanted += [one for one in inner if one not in wanted]
     return "\n".join(parts) + "\n"
 
 
 @cache
-def _notes(name: str) -> dict[str, tuple[str, str]]:
-    """Return the type and the text below each field of a class in messages.py."""
+def _notes(record: type) -> dict[str, tuple[str, str]]:
+    """Return the type and the text below each field of a record."""
     found: dict[str, tuple[str, str]] = {}
-    for node in ast.parse(inspect.getsource(messages)).body:
-        if not isinstance(node, ast.ClassDef) or node.name != name:
-            continue
+    for node in ast.parse(inspect.getsource(record)).body:
+        assert isinstance(node, ast.ClassDef)
         for statement, below in zip(node.body, [*node.body[1:], None], strict=True):
             if isinstance(statement, ast.AnnAssign) and isinstance(statement.target, ast.Name):
                 note = ""
