@@ -18,7 +18,7 @@ from brachium_fusion.best_arm import ArmSolution, Tracked, solve_arm
 from brachium_fusion.best_material import Material, calibrated
 from brachium_fusion.best_spans import rows_of_spans
 from brachium_fusion.offline_orientation import smooth_orientation
-from brachium_fusion.pose import Alignment
+from brachium_fusion.pose import POSES, Alignment
 from brachium_fusion.rows import Row, rows_of
 from brachium_fusion.sensor_to_segment import SensorRecord, Span, align_segments
 from brachium_fusion.session_terms import lengths_of
@@ -39,6 +39,8 @@ class Best:
 
     skeletons: list[Skeleton]
     alignment: Alignment | None
+    magnetometer: bool = False
+    """Whether some sensor's magnetic field was used."""
     parts: dict[str, str] = field(default_factory=dict)
     """What was used for each part of the way, in words."""
     refused: dict[str, str] = field(default_factory=dict)
@@ -60,10 +62,8 @@ def solve(
     }
     time_s, rate_hz = grid(series)
     tracked = {s: _tracked(on_grid(one, time_s), rate_hz) for s, one in series.items()}
-    heading = any(one.magnetometer for one in tracked.values())
-    best.parts["orientation"] = "offline VQF for tilt" + (
-        ", robust heading from the field of the whole recording" if heading else ", no magnetometer"
-    )
+    best.magnetometer = any(one.magnetometer and one.raw for one in tracked.values())
+    best.parts["orientation"] = _filtered(tracked)
     spans = rows_of_spans(material, tracked, time_s, rate_hz)
     best.alignment = _align(material, tracked, spans, rate_hz, best)
     solutions = [
@@ -73,7 +73,7 @@ def solve(
             best.alignment,
             lengths_of(material.session),
             material.stated,
-            next((s for s in spans if s.kind in ("n-pose", "table", "given")), None),
+            next((s for s in spans if s.kind in POSES), None),
             rate_hz,
         )
         for side in SIDES
@@ -85,6 +85,20 @@ def solve(
         best.warnings += [w for w in solution.warnings if w not in best.warnings]
     _finish(material, settings, tracked, solutions, (time_s, times_s, rate_hz), best)
     return best
+
+
+def _filtered(tracked: Mapping[str, Tracked]) -> str:
+    """Return in words how the sensors' orientations came about."""
+    raw = [one for one in tracked.values() if one.raw]
+    if not raw:
+        return "as the sensors deliver it"
+    heading = any(one.magnetometer for one in raw)
+    own = len(raw) < len(tracked)
+    return (
+        "offline VQF for tilt"
+        + (", robust heading from the field of the whole recording" if heading else ", no magnetometer")
+        + ("; as delivered of sensors that give orientation only" if own else "")
+    )
 
 
 def _tracked(samples: Uniform, rate_hz: float) -> Tracked:
@@ -119,12 +133,23 @@ def _align(
     best.refused |= alignment.refused
     if not alignment.mounting:
         return None
-    best.parts["alignment"] = " and ".join(dict.fromkeys(span.kind for span in spans))
+    best.parts["alignment"] = " and ".join(_rests_on(spans, alignment))
     best.warnings += alignment.warnings
     for segment, turn in alignment.heading.items():
         one = tracked[segment]
         one.world_from_sensor = rotation.multiply(rotation.about(2, turn), one.world_from_sensor)
     return alignment
+
+
+def _rests_on(spans: list[Span], alignment: Alignment) -> list[str]:
+    """Return the kinds of span that were used: a movement that no elbow took shows nothing."""
+    ends = {joint.removeprefix("elbow") for joint in alignment.joints}
+    used = (
+        span.kind
+        for span in spans
+        if span.kind in POSES or any(f"{span.kind}{end}" not in alignment.refused for end in ends)
+    )
+    return list(dict.fromkeys(used))
 
 
 def _finish(

@@ -25,6 +25,7 @@ from brachium_fusion.solve_terms import (
     SolveReport,
     SolveSettings,
 )
+from brachium_fusion.subject import Subject
 from brachium_fusion.zhou_recording import NEEDS, ZhouName, solve_zhou
 from brachium_wire import capture as captures
 from brachium_wire import recording, table
@@ -76,7 +77,12 @@ def _capture(settings: SolveSettings) -> Outcome:
         drops=pipeline.subject(from_capture.SUBJECT).drops,
         warnings=[*capture.warnings, *([NO_CALIBRATION] if alignment is None else alignment.warnings)],
         alignment=alignment,
+        magnetometer=_field_used(pipeline.subject(from_capture.SUBJECT)),
     )
+
+
+def _field_used(subject: Subject) -> bool:
+    return any(track.magnetometer for track in subject.tracks.values())
 
 
 def _best(
@@ -100,6 +106,7 @@ def _best(
         times_s=shown_s,
         warnings=[*material.warnings, *found.warnings, *nothing],
         alignment=found.alignment,
+        magnetometer=found.magnetometer,
         metadata=metadata,
         parts=found.parts,
         refused=found.refused,
@@ -144,6 +151,7 @@ def _recording(settings: SolveSettings) -> Outcome:
         drops=pipeline.subject(name).drops + pipeline.drops,
         warnings=[*warnings, *(nothing if alignment is None else alignment.warnings)],
         alignment=alignment,
+        magnetometer=_field_used(pipeline.subject(name)),
         metadata={"subject": name, "time_zero_ns": zero},
         live=(compared, angle, position) if compared else None,
     )
@@ -184,7 +192,7 @@ def _finish(settings: SolveSettings, outcome: Outcome) -> SolveReport:
                 "made_by": "brachium solve",
                 "input": settings.input.name,
                 "filter": _split(settings.filter)[0] or chosen.filter,
-                "magnetometer": chosen.magnetometer,
+                "magnetometer": outcome.magnetometer,
                 "mode": settings.mode,
                 "forward": forward,
                 "origin": skeletons[-1].origin,

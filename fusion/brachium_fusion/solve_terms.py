@@ -86,6 +86,8 @@ class Outcome:
     """The same as they are shown."""
     warnings: list[str]
     alignment: Alignment | None
+    magnetometer: bool
+    """Whether some sensor's magnetic field was used."""
     drops: Counter[str] = field(default_factory=Counter)
     metadata: dict[str, object] = field(default_factory=dict)
     live: tuple[int, float, float] | None = None
