@@ -1,18 +1,12 @@
 """One node's WebSocket at the gateway: moves bytes and time between the socket and the conversation."""
 
-import asyncio
 from collections.abc import Callable
 
-from websockets.asyncio.server import ServerConnection
-from websockets.exceptions import ConnectionClosed
-
 from brachium_nodes.conversation import Action, Close, Conversation, Publish, Send
+from brachium_nodes.node_socket import NodeSocket
 from brachium_nodes.roster import Admission
 from brachium_wire.hosttime import HostClock
 from brachium_wire.messages import Message
-
-TICK_S = 0.05
-TOO_BIG = 1009
 
 
 class Connection:
@@ -24,7 +18,7 @@ class Connection:
 
     def __init__(
         self,
-        socket: ServerConnection,
+        socket: NodeSocket,
         conversation: Conversation,
         clock: HostClock,
         publish: Callable[[Admission, str, Message], None],
@@ -35,39 +29,31 @@ class Connection:
         self._gone = False
         self.replaced = False
         """Another connection of the same node took over: this one says nothing more of it."""
+        socket.message, socket.closed = self._receive, self._closed
 
-    async def run(self) -> None:
-        """Serve until the connection is closed."""
-        ticker = asyncio.create_task(self._tick())
-        oversize = False
-        try:
-            async for payload in self._socket:
-                await self.do(self.conversation.receive(payload, self._clock.now_ns()))
-        except ConnectionClosed as error:
-            oversize = error.sent is not None and error.sent.code == TOO_BIG
-        finally:
-            ticker.cancel()
-            self._finish(oversize=oversize)
+    def tick(self, now_s: float) -> None:
+        """Do what time asks for. Call it every 50 ms; `now_s`: the event loop's time."""
+        self._socket.keep_alive(now_s)
+        if actions := self.conversation.tick(self._clock.now_ns()):
+            self.do(actions)
 
-    async def do(self, actions: list[Action]) -> None:
+    def do(self, actions: list[Action]) -> None:
         """Carry out what the conversation asks for. A peer that is gone is no error here."""
         for action in actions:
-            try:
-                match action:
-                    case Publish():
-                        self._share(action)
-                    case Send():
-                        await self._socket.send(action.frame)
-                    case Close():
-                        self._finish()  # before the close: who waits for it finds the counts final
-                        await self._socket.close(action.code, action.reason)
-            except ConnectionClosed:
-                continue
+            if isinstance(action, Publish):
+                self._share(action)
+            elif isinstance(action, Send):
+                self._socket.send(action.frame)
+            else:
+                assert isinstance(action, Close)
+                self._finish()  # before the close: who waits for it finds the counts final
+                self._socket.close(action.code, action.reason)
 
-    async def _tick(self) -> None:
-        while True:
-            await self.do(self.conversation.tick(self._clock.now_ns()))
-            await asyncio.sleep(TICK_S)
+    def _receive(self, payload: bytes | str) -> None:
+        self.do(self.conversation.receive(payload, self._clock.now_ns()))
+
+    def _closed(self, oversize: bool) -> None:
+        self._finish(oversize=oversize)
 
     def _share(self, action: Publish) -> None:
         admission = self.conversation.admission

@@ -5,12 +5,12 @@ import hashlib
 import logging
 import threading
 from collections.abc import Callable
+from contextlib import AsyncExitStack
 from dataclasses import dataclass
 from http import HTTPStatus
 from pathlib import Path
 
-from websockets.asyncio.server import ServerConnection, serve
-from websockets.http11 import Request, Response
+from websockets.http11 import Request
 
 from brachium_nodes.assign_command import serve_assign
 from brachium_nodes.connection import Connection
@@ -19,7 +19,9 @@ from brachium_nodes.discovery import answer_seekers
 from brachium_nodes.host_claim import HostClaims, checked_host
 from brachium_nodes.known_calibrations import calibrations_in
 from brachium_nodes.listening import CannotListen, listening_address, why_not
+from brachium_nodes.node_door import listening
 from brachium_nodes.node_frames import MAX_FRAME_BYTES, Hello
+from brachium_nodes.node_socket import House, NodeSocket
 from brachium_nodes.roster import Admission, NodeEntry, Refusal, Roster
 from brachium_wire import keys
 from brachium_wire.bus import DEFAULT_ENDPOINT, Bus
@@ -31,7 +33,7 @@ from brachium_wire.messages import Message, Quaternion, SampleBatch
 log = logging.getLogger(__name__)
 
 PATH = "/node"
-STOP_LOOK_S = 0.05
+TICK_S = 0.05
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -77,72 +79,59 @@ class Gateway:
         self._claims = HostClaims(bus, settings.room, settings.id)
         self._connections: dict[str, Connection] = {}
         self._tokens: dict[str, Callable[[], None]] = {}
-        self._tasks: set[asyncio.Task[None]] = set()
+        self._open: set[Connection] = set()
         self._told: dict[tuple[str, str], str] = {}  # whose info a place shows, connected or not
 
     async def serve(self, address: str, stop: threading.Event) -> None:
         """Listen until `stop` is set."""
-        settings, quiet = self._settings, logging.getLogger(f"{__name__}.websockets")
-        quiet.setLevel(logging.CRITICAL)  # every stranger's half handshake would be a traceback
-        server = serve(
-            self._join,
-            address,
-            settings.port,
-            process_request=self._door,
-            compression=None,
-            max_size=MAX_FRAME_BYTES,
-            max_queue=16,
-            ping_interval=5,
-            ping_timeout=10,
-            open_timeout=3,
-            close_timeout=1,
-            logger=quiet,
-        )
-        try:
-            listening = await server
-        except OSError as error:
-            raise CannotListen(why_not(error, address, settings.port)) from None
-        async with listening:
-            port = listening.sockets[0].getsockname()[1]
+        settings, loop = self._settings, asyncio.get_running_loop()
+        house = House(door=self._door, opened=self._join, broken=self._broken, max_bytes=MAX_FRAME_BYTES)
+        async with AsyncExitStack() as stack:
+            try:
+                port = await stack.enter_async_context(listening(house, address, settings.port))
+            except OSError as error:
+                raise CannotListen(why_not(error, address, settings.port)) from None
             self._heart = Heart(self._bus, settings.room, "gateway", settings.id)
             self._heart.text = f"ws://{f'[{address}]' if ':' in address else address}:{port}{PATH}"
             tell_host_time(self._bus, settings.room, settings.id, self._clock.now_ns)
-            serve_assign(self._bus, settings.room, asyncio.get_running_loop(), self._assign)
+            serve_assign(self._bus, settings.room, loop, self._assign)
             log.info("gateway %s takes nodes at %s", settings.id, self._heart.text)
             self._beat(now=True)
             async with answer_seekers(
                 address, settings.discovery_port, self._heart.text, self._roster.token_of
             ):
                 while not stop.is_set():
-                    await asyncio.sleep(STOP_LOOK_S)
+                    await asyncio.sleep(TICK_S)
+                    self._tick(loop.time())
                     self._beat()
                     self._give_way()
         self._beat(now=True)
         log.info("gateway %s ended", settings.id)
 
-    def _door(self, connection: ServerConnection, request: Request) -> Response | None:
+    def _door(self, request: Request) -> tuple[HTTPStatus, str] | None:
         if request.path != PATH:
-            return connection.respond(HTTPStatus.NOT_FOUND, f"nodes connect to {PATH}\n")
+            return HTTPStatus.NOT_FOUND, f"nodes connect to {PATH}\n"
         if not self._roster.knows(_presented(request)):
             self._heart.drops["unauthorized"] += 1
-            return connection.respond(
-                HTTPStatus.UNAUTHORIZED, "send Authorization: Bearer and this node's token\n"
-            )
+            return HTTPStatus.UNAUTHORIZED, "send Authorization: Bearer and this node's token\n"
         return None
 
-    async def _join(self, socket: ServerConnection) -> None:
-        assert socket.request is not None
-        token = _presented(socket.request)
+    def _broken(self, name: str) -> None:
+        self._heart.drops[name] += 1
+
+    def _join(self, socket: NodeSocket, request: Request) -> None:
+        token = _presented(request)
 
         def admit(hello: Hello) -> Admission | Refusal:
             return self._admit(hello, token, connection)
 
         conversation = Conversation(admit, self._settings.id, self._clock.now_ns())
         connection = Connection(socket, conversation, self._clock, self._publish, self._left)
-        try:
-            await connection.run()
-        except Exception:  # the library's own log is silenced above
-            log.exception("a node's connection failed")
+        self._open.add(connection)
+
+    def _tick(self, now_s: float) -> None:
+        for connection in list(self._open):
+            connection.tick(now_s)
 
     def _admit(self, hello: Hello, token: str, connection: Connection) -> Admission | Refusal:
         subject = self._roster.subject_of(hello.node)
@@ -165,6 +154,7 @@ class Gateway:
         return answer
 
     def _left(self, connection: Connection) -> None:
+        self._open.discard(connection)
         hello, admission = connection.conversation.hello, connection.conversation.admission
         if (refused := connection.conversation.refused) is not None and refused.code == "bad_hello":
             self._heart.drops["bad_hello"] += 1
@@ -199,9 +189,8 @@ class Gateway:
                 self._bus.forget(keys.info(self._settings.room, *place))
 
     def _expel(self, connection: Connection, refusal: Refusal) -> None:
-        task = asyncio.create_task(connection.do(connection.conversation.expel(refusal)))
-        self._tasks.add(task)
-        task.add_done_callback(self._tasks.discard)
+        # In a turn of its own: who takes over is there before the old one leaves.
+        asyncio.get_running_loop().call_soon(connection.do, connection.conversation.expel(refusal))
 
     def _give_way(self) -> None:
         for subject in self._subjects():
