@@ -5,7 +5,7 @@ A row's set of known segments is the number 1 (upper arm) + 2 (forearm) + 4 (han
 """
 
 from collections.abc import Collection
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import NamedTuple
 
 import numpy as np
@@ -53,6 +53,8 @@ class StatedAngles:
 
 
 AS_STATED_BY_DEFAULT = StatedAngles()
+ASSUMABLE: tuple[str, ...] = tuple(field.name for field in fields(StatedAngles))
+"""Angles that may be stated of joints that no sensor sees."""
 
 
 class Provenance(NamedTuple):

@@ -1,7 +1,7 @@
 """Ranges of the angles, by name, in degrees because people read them. An angle outside is kept and
 flagged."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -16,6 +16,10 @@ class Range(NamedTuple):
 
     low: float | None
     high: float | None
+
+    def ends(self) -> tuple[float, float]:
+        """Return both, infinite where there is none."""
+        return -np.inf if self.low is None else self.low, np.inf if self.high is None else self.high
 
 
 REFERENCE: Mapping[str, Range] = {
@@ -58,6 +62,15 @@ PLAUSIBLE: Mapping[str, Range] = {
 }
 """What a joint can do at all: chooses between branches and flags, never clamps."""
 
+STATED: Mapping[str, Range] = {
+    "shoulder_flexion": Range(-185.0, 185.0),  # of elevation the part to the front: it goes as far
+    **{
+        name: PLAUSIBLE[name]
+        for name in ("elbow_flexion", "forearm_pronation", "wrist_flexion", "wrist_deviation")
+    },
+}
+"""Angles that a person may state, of a pose that is held or of a joint without a sensor."""
+
 RANGES: Mapping[str, Mapping[str, Range]] = {
     "reference": REFERENCE,
     "paper": PAPER,
@@ -66,12 +79,20 @@ RANGES: Mapping[str, Mapping[str, Range]] = {
 }
 
 
+def check_stated(angles_deg: Mapping[str, float], names: Collection[str] = tuple(STATED)) -> None:
+    """Raise ValueError that begins with the angle: one that is not among `names`, or that no joint can do."""
+    for name, value in angles_deg.items():
+        if name not in names:
+            raise ValueError(f"{name}: no angle that can be stated; expected {', '.join(sorted(names))}")
+        low, high = STATED[name].ends()
+        if not low <= value <= high:  # true for NaN too
+            raise ValueError(f"{name} = {value:g}: no joint does that; expected degrees, {low:g} to {high:g}")
+
+
 def _bounds(ranges: Mapping[str, Range]) -> tuple[Array, Array]:
     low, high = np.full(len(COLUMNS), -np.inf), np.full(len(COLUMNS), np.inf)
     for index, name in enumerate(COLUMNS):
-        given = ranges.get(name, Range(None, None))
-        low[index] = -np.inf if given.low is None else np.radians(given.low)
-        high[index] = np.inf if given.high is None else np.radians(given.high)
+        low[index], high[index] = np.radians(ranges.get(name, Range(None, None)).ends())
     return low, high
 
 

@@ -2,8 +2,9 @@
 
 from typing import Any
 
+from brachium_body.ranges import check_stated
 from brachium_fusion.guided import MOTIONS
-from brachium_fusion.pose import POSES, pose_orientations
+from brachium_fusion.pose import POSES
 from brachium_fusion.pose_watch import STILL_S
 
 ZERO_S = 1.0
@@ -32,7 +33,14 @@ def checked_wish(arguments: dict[str, Any]) -> dict[str, Any]:
     motions = ROUTINES[routine] if motions is None else motions
     if not isinstance(motions, list | tuple) or not set(motions) <= set(MOTIONS):
         raise ValueError(f"calibrate: motions are some of {', '.join(MOTIONS)}, not {motions!r}")
-    pose_orientations(pose, angles)
+    if (pose == "given") != bool(angles):
+        raise ValueError(
+            "calibrate: the pose given, and only that, takes angles_deg: the angles that are held"
+        )
+    try:
+        check_stated(angles)
+    except ValueError as error:
+        raise ValueError(f"calibrate: angles_deg.{error}") from None
     return {
         "pose": pose,
         "seconds": float(seconds),

@@ -1,10 +1,10 @@
 """What a session says of a person, in the terms of the arm's model. Pure."""
 
-from dataclasses import fields
 from math import radians
 
-from brachium_body.assumptions import AS_STATED_BY_DEFAULT, StatedAngles
+from brachium_body.assumptions import AS_STATED_BY_DEFAULT, ASSUMABLE, StatedAngles
 from brachium_body.lengths import ArmLengths, from_measured
+from brachium_body.ranges import check_stated
 from brachium_wire.messages import Session
 
 DEFAULT_HEIGHT_M = 1.75
@@ -19,9 +19,10 @@ def lengths_of(session: Session) -> ArmLengths:
 def check_session(session: Session) -> None:
     """Raise ValueError naming what of a session no arm has, or what nobody can use."""
     lengths_of(session)
-    unknown = sorted(set(session.assumed_angles_deg) - {f.name for f in fields(StatedAngles)})
-    if unknown:
-        raise ValueError(f"assumed_angles_deg cannot use {unknown[0]!r}")
+    try:
+        check_stated(session.assumed_angles_deg, ASSUMABLE)
+    except ValueError as error:
+        raise ValueError(f"assumed_angles_deg.{error}") from None
 
 
 def stated_angles(session: Session) -> StatedAngles:

@@ -32,3 +32,14 @@ def test_what_is_not_known_or_has_no_range_is_not_flagged():
     assert not ranges.outside_plausible(np.full(len(angles.COLUMNS), np.nan)).any()
     flags = ranges.outside_plausible(np.full(len(angles.COLUMNS), 100.0))
     assert {name for name, flag in zip(angles.COLUMNS, flags, strict=True) if flag} == set(ranges.PLAUSIBLE)
+
+
+def test_what_no_joint_can_do_is_not_taken_as_stated():
+    ranges.check_stated({"elbow_flexion": 160.0, "shoulder_flexion": -40.0})
+    for value in (350.0, -16.0, np.nan, np.inf):
+        with pytest.raises(ValueError, match=r"^elbow_flexion = .*: no joint does that; .* -15 to 160$"):
+            ranges.check_stated({"wrist_flexion": 10.0, "elbow_flexion": value})
+    with pytest.raises(ValueError, match=r"^elbow: no angle that can be stated; expected elbow_flexion, "):
+        ranges.check_stated({"elbow": 10.0})
+    with pytest.raises(ValueError, match=r"expected elbow_flexion$"):
+        ranges.check_stated({"wrist_flexion": 10.0}, ("elbow_flexion",))

@@ -83,6 +83,10 @@ def test_without_fusion_it_says_so(endpoint: str, capsys: pytest.CaptureFixture[
     [
         (["--angle", "elbow_flexion=35"], "belongs to --pose given"),
         (["--pose", "given", "--angle", "elbow"], "write NAME=DEG"),
+        (["--pose", "given", "--angle", "elbow=35"], "--angle elbow: no angle that can be stated"),
+        (["--pose", "given", "--angle", "elbow_flexion=350"], "expected degrees, -15 to 160"),
+        (["--pose", "given"], "--pose given needs the angles that are held"),
+        (["--zero", "--pose", "table"], "--zero takes no --pose"),
         (["--seconds", "0"], "from 1 to 30"),
         (["--routine", "dance"], "invalid choice"),
     ],

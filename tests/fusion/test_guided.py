@@ -185,6 +185,12 @@ def test_what_may_be_asked_is_said() -> None:
         checked_wish({"motions": ["hop"]})
     with pytest.raises(ValueError, match="does not know 'motion'"):
         checked_wish({"motion": "free"})
+    with pytest.raises(ValueError, match="takes angles_deg: the angles that are held"):
+        checked_wish({"pose": "given"})
+    with pytest.raises(ValueError, match="takes angles_deg"):
+        checked_wish({"pose": "table", "angles_deg": {"elbow_flexion": 80.0}})
+    with pytest.raises(ValueError, match=r"angles_deg\.elbow_flexion = 350: no joint does that"):
+        checked_wish({"pose": "given", "angles_deg": {"elbow_flexion": 350.0}})
     with pytest.raises(ValueError, match="zero takes seconds"):
         checked_zero({"pose": "n-pose"})
     assert checked_wish({"routine": "free"})["motions"] == ["free"]

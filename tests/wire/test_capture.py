@@ -158,7 +158,28 @@ def test_a_wrong_segment_file_is_named_in_one_line(tmp_path: Path, text: str, sa
         ("facing_deg = 361", "facing_deg = 361: expected degrees, -360 to 360"),
         (
             "assumed_angles_deg = { elbow_flexion = 400 }",
-            "assumed_angles_deg.elbow_flexion = 400: expected degrees, -360 to 360",
+            "assumed_angles_deg.elbow_flexion = 400: no joint does that; expected degrees, -15 to 160",
+        ),
+        (
+            "assumed_angles_deg = { shoulder_flexion = 4 }",
+            "assumed_angles_deg.shoulder_flexion: no angle",
+        ),
+        (
+            "[calibration]\npose = 'given'\nto_s = 0.02\nangles_deg = { elbow_flexion = 350 }",
+            "calibration.angles_deg.elbow_flexion = 350: no joint does that; expected degrees, -15 to 160",
+        ),
+        (
+            "[calibration]\npose = 'given'\nto_s = 0.02\nangles_deg = { elbow_flexion = nan }",
+            "elbow_flexion = nan: no joint",
+        ),
+        (
+            "[calibration]\npose = 'given'\nto_s = 0.02\nangles_deg = { elbow = 35 }",
+            "calibration.angles_deg.elbow: no angle that can be stated; expected elbow_flexion, ",
+        ),
+        ("[calibration]\npose = 'given'\nto_s = 0.02", "the pose given needs the angles that are held"),
+        (
+            "[calibration]\npose = 'n-pose'\nto_s = 0.02\nangles_deg = { elbow_flexion = 5 }",
+            'angles_deg belongs to pose = "given"',
         ),
         ("facing_deg = nan", "facing_deg = nan: expected degrees, -360 to 360"),
         ("mounting = 3", "mounting: expected a table"),

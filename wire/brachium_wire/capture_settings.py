@@ -9,6 +9,8 @@ from typing import Any, Literal, get_args
 import msgspec
 import numpy as np
 
+from brachium_body.assumptions import ASSUMABLE
+from brachium_body.ranges import STATED, check_stated
 from brachium_body.segments import SEGMENTS, Segment
 from brachium_wire.capture_words import in_words, nearest
 from brachium_wire.messages import Quaternion, SensorCalibration, Vector
@@ -171,12 +173,17 @@ def _check(settings: CaptureSettings) -> None:
     for entry, metres in {"height_m": settings.height_m, **lengths}.items():
         if metres is not None and not 0.0 < metres <= MAX_HEIGHT_M:
             raise CaptureError(f"{entry} = {metres:g}: expected metres, above 0 and at most {MAX_HEIGHT_M:g}")
-    angles = {f"calibration.angles_deg.{name}": a for name, a in settings.calibration.angles_deg.items()}
-    angles |= {f"assumed_angles_deg.{name}": a for name, a in settings.assumed_angles_deg.items()}
-    for entry, degrees in {"facing_deg": settings.facing_deg, **angles}.items():
-        if degrees is not None and not -360.0 <= degrees <= 360.0:
-            raise CaptureError(f"{entry} = {degrees:g}: expected degrees, -360 to 360")
+    if settings.facing_deg is not None and not -360.0 <= settings.facing_deg <= 360.0:
+        raise CaptureError(f"facing_deg = {settings.facing_deg:g}: expected degrees, -360 to 360")
     spans = settings.calibration
+    _check_angles("assumed_angles_deg", settings.assumed_angles_deg, ASSUMABLE)
+    _check_angles("calibration.angles_deg", spans.angles_deg, tuple(STATED))
+    if spans.pose == "given" and not spans.angles_deg:
+        raise CaptureError(
+            "calibration: the pose given needs the angles that are held, angles_deg = { elbow_flexion = 35 }"
+        )
+    if spans.pose != "given" and spans.angles_deg:
+        raise CaptureError('calibration: angles_deg belongs to pose = "given"; leave it out, or write that')
     if spans.pose is not None and spans.to_s is None:
         raise CaptureError("calibration: a pose needs to_s, the second at which it ends")
     if spans.to_s is not None and not 0.0 <= (spans.from_s or 0.0) < spans.to_s:
@@ -196,6 +203,13 @@ def _check(settings: CaptureSettings) -> None:
             raise CaptureError(
                 f"mounting.{name}: {list(q)} is no rotation; a quaternion w x y z has length 1"
             )
+
+
+def _check_angles(entry: str, angles_deg: Mapping[str, float], names: tuple[str, ...]) -> None:
+    try:
+        check_stated(angles_deg, names)
+    except ValueError as error:
+        raise CaptureError(f"{entry}.{error}") from None
 
 
 def _normalized(settings: CaptureSettings) -> CaptureSettings:

@@ -52,9 +52,7 @@ def run(args: argparse.Namespace) -> int:
     from brachium_wire import keys
     from brachium_wire.bus import Bus
 
-    angles = dict(args.angle)
-    if angles and args.pose != "given":
-        raise Usage("--angle belongs to --pose given")
+    angles = _held(args)
     stop = stop_on_signals()
     with Bus.open(args.endpoint, stop=stop) as bus:
         news = bus.subscribe(keys.calibration(args.room, args.subject))
@@ -74,6 +72,24 @@ def run(args: argparse.Namespace) -> int:
     if not answer.ok:
         raise Failed(answer.reason)
     return 0
+
+
+def _held(args: argparse.Namespace) -> dict[str, float]:
+    """Return the angles of the pose `given`, checked before anybody is asked."""
+    from brachium_body.ranges import check_stated
+
+    angles = dict(args.angle)
+    if args.zero and (angles or args.pose != "n-pose"):
+        raise Usage("--zero takes no --pose and no --angle: the arms hang still")
+    if angles and args.pose != "given":
+        raise Usage("--angle belongs to --pose given")
+    if args.pose == "given" and not angles:
+        raise Usage("--pose given needs the angles that are held: --angle elbow_flexion=35")
+    try:
+        check_stated(angles)
+    except ValueError as error:
+        raise Usage(f"--angle {error}") from None
+    return angles
 
 
 def _asked(
