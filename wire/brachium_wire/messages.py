@@ -80,6 +80,8 @@ class Info(Message, frozen=True, kw_only=True, tag="info/1"):
     """Whether batches will carry a magnetic field."""
     orientation_only: bool = msgspec.field(name="ori", default=False)
     """Whether batches carry `quat` and nothing else."""
+    heading_free: bool = msgspec.field(name="free", default=False)
+    """Whether its orientations have a heading of their own, which drifts: there is no magnetometer behind them."""
 
 
 class Status(Message, frozen=True, kw_only=True, tag="status/1"):
@@ -103,6 +105,8 @@ class Status(Message, frozen=True, kw_only=True, tag="status/1"):
     """Samples that arrived during the last second."""
     battery_v: float | None = msgspec.field(name="bat", default=None)
     """Battery voltage, V."""
+    battery_level: float | None = msgspec.field(name="batl", default=None)
+    """How full the battery is, 0 to 1."""
     battery_hours: float | None = msgspec.field(name="bath", default=None)
     """Estimated time left, h."""
     rssi_dbm: float | None = msgspec.field(name="rssi", default=None)
