@@ -9,7 +9,7 @@ still from one another and from the sternum, and which side an upper arm is on w
 it.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from math import radians
 from typing import Literal, NamedTuple
@@ -45,6 +45,11 @@ UNCLEAR = 14.0
 """Sum of squares above which a node fits nowhere: of some six normal terms one in fifty exceeds it."""
 RESTLESS_RAD = radians(6.0)
 """An arm sways by a degree or two while it hangs."""
+OTHER_MOVEMENT = (
+    "the movement that was asked for was not seen: no sensor felt an arm that hangs, is raised sideways to "
+    "shoulder height and let down, and then bends its elbow; repeat the check with these movements alone"
+)
+"""Where nothing fits, all sensors are seldom worn wrongly."""
 MARGIN = 4.0
 """Being as it should be is preferred by this much: one clear contradiction weighs more."""
 
@@ -113,7 +118,11 @@ def check_wear(
         mirrored: Feelings = [(_OTHER[moved], felt_now) for moved, felt_now in feelings]
         ways.append(_assign(nominal, mirrored, distances))
     chosen = min(ways, key=lambda way: sum(seat.cost for seat in way.values()))
-    return WearCheck(findings=tuple(_finding(s, chosen[s], nominal, len(passes)) for s in nominal))
+    findings = tuple(_finding(s, chosen[s], nominal, len(passes)) for s in nominal)
+    on_arms = [f for f in findings if side_of(f.segment) is not None]
+    if len(on_arms) > 1 and all(f.seat is None for f in on_arms):
+        return WearCheck(findings=(), refused=OTHER_MOVEMENT)
+    return WearCheck(findings=findings)
 
 
 _OTHER: dict[Side, Side] = {"right": "left", "left": "right"}
@@ -137,9 +146,18 @@ def _refusal(feelings: dict[Segment, Felt]) -> str:
         return (
             f"{', '.join(restless)} did not hang still at the beginning: let the arms hang for three seconds"
         )
-    if max((float(np.linalg.norm(f.raised)) for f in feelings.values()), default=0.0) < TOO_LITTLE_RAD:
+    if not _moved(f.raised for f in feelings.values()):
         return "no sensor moved when the arm was to be raised: raise it sideways to shoulder height"
+    bends = any(part_of(s) in ("forearm", "hand") for s in feelings)
+    if bends and not _moved(f.bent for f in feelings.values()):
+        return (
+            "no sensor moved when the elbow was to be bent: bend it, the upper arm still, and straighten it"
+        )
     return ""
+
+
+def _moved(turns: Iterable[Floats]) -> bool:
+    return any(float(np.linalg.norm(turn)) >= TOO_LITTLE_RAD for turn in turns)
 
 
 def _assign(

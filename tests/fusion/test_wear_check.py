@@ -175,6 +175,24 @@ def test_an_arm_that_was_not_raised_is_refused() -> None:
     assert "raise it sideways to shoulder height" in check.refused
 
 
+def test_an_elbow_that_was_not_bent_is_refused() -> None:
+    p = fine_pass()
+    check = check_wear([replace(p, spans=p.spans | {"bend": p.spans["hang"]})], RATE_HZ)
+    assert "when the elbow was to be bent: bend it" in check.refused
+    upper: dict[Segment, WearRecord] = {"upper_arm_r": p.records["upper_arm_r"]}
+    alone = check_wear([replace(p, records=upper, spans=p.spans | {"bend": p.spans["hang"]})], RATE_HZ)
+    assert "elbow" not in alone.refused
+
+
+def test_another_movement_than_the_one_asked_for_blames_no_sensor() -> None:
+    """The elbow was bent when the arm was to be raised, and the other way round."""
+    p = fine_pass()
+    exchanged: dict[Motion, tuple[int, int]] = {**p.spans, "raise": p.spans["bend"], "bend": p.spans["raise"]}
+    check = check_wear([replace(p, spans=exchanged)], RATE_HZ)
+    assert check.findings == ()
+    assert "the movement that was asked for was not seen" in check.refused
+
+
 def test_a_gyroscopes_bias_does_no_harm() -> None:
     p = fine_pass()
     biased = {s: replace(r, gyr=r.gyr + np.array([0.05, -0.03, 0.02])) for s, r in p.records.items()}
