@@ -19,6 +19,7 @@ EXTRAS = {
     "jinja2": "report",
     "matplotlib": "report",
     "can": "can",
+    "cantools": "can",
     "segno": "site",
 }
 """Heavy packages and the extra that brings each."""

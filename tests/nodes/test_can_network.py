@@ -1,0 +1,164 @@
+"""Sensors on a CAN bus, through the real service, a real router and an interface of python-can."""
+
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import can
+import numpy as np
+import pytest
+from cantools import database
+
+from brachium_nodes.can import service
+from brachium_nodes.can.map_files import SHIPPED
+from brachium_nodes.can.port import PortSettings
+from brachium_wire import keys
+from brachium_wire.bus import Bus
+from brachium_wire.codec import decode
+from brachium_wire.messages import Health, Info, SampleBatch, Status
+from brachium_wire.samples import read_samples
+
+pytestmark = pytest.mark.network
+
+WITHIN_S = 20.0
+ACC, GYR, MAG = (0.5, -0.25, 9.75), (0.125, 0.25, -0.5), (0.25, 0.5, -0.75)
+
+SENSORS = """
+[[sensor]]
+id = "mti-1"
+map = "mti-600"
+subject = "p01"
+segment = "upper_arm_r"
+mounting = [1, 0, 0, 0]
+
+[[sensor]]
+id = "mti-2"
+map = "mti-600"
+subject = "p01"
+segment = "forearm_r"
+add_to_ids = 0x100
+
+[[sensor]]
+id = "lpms-3"
+map = "lpms-orientation"
+subject = "p01"
+segment = "hand_r"
+add_to_ids = 2
+"""
+
+
+def until(found: Callable[[], bool]) -> None:
+    deadline = time.monotonic() + WITHIN_S
+    while not found():
+        assert time.monotonic() < deadline
+        time.sleep(0.01)
+
+
+@contextmanager
+def running(settings: service.CanSettings) -> Iterator[None]:
+    stop, failed = threading.Event(), []
+
+    def run() -> None:
+        try:
+            service.run(settings, stop)
+        except Exception as error:
+            failed.append(error)
+
+    thread = threading.Thread(target=run)
+    thread.start()
+    try:
+        yield
+    finally:
+        stop.set()
+        thread.join(5.0)
+        assert not thread.is_alive()
+        assert failed == []
+
+
+class Sender:
+    """Sensors as their data sheets have them, encoded by cantools."""
+
+    def __init__(self, bus: can.BusABC) -> None:
+        self.bus = bus
+        self.mti = database.load_file(SHIPPED / "mti-600.dbc")
+        self.lpms = database.load_file(SHIPPED / "lpms.dbc")
+
+    def send(self, number: int, data: bytes) -> None:
+        self.bus.send(can.Message(arbitration_id=number, data=data, is_extended_id=False))
+
+    def mti_sample(self, ticks: int, offset: int, leave_out: tuple[str, ...] = ()) -> None:
+        values = {
+            "SampleTime": {"SampleTime": ticks},
+            "RateOfTurn": dict(zip(("GyrX", "GyrY", "GyrZ"), GYR, strict=True)),
+            "Acceleration": dict(zip(("AccX", "AccY", "AccZ"), ACC, strict=True)),
+            "MagneticField": dict(zip(("MagX", "MagY", "MagZ"), MAG, strict=True)),
+        }
+        for name, signals in values.items():
+            message = self.mti.get_message_by_name(name)
+            if name not in leave_out:
+                self.send(message.frame_id + offset, message.encode(signals))
+
+    def lpms_sample(self) -> None:
+        message = self.lpms.get_message_by_name("Channels1to4")
+        signals = {"QuatW": 0.6, "QuatX": 0.0, "QuatY": 0.8, "QuatZ": 0.0}
+        self.send(message.frame_id + 2, message.encode(signals))
+
+
+def test_sensors_of_two_makers_come_in_beside_a_babbling_node(endpoint: str, tmp_path: Path):
+    table = tmp_path / "sensors.toml"
+    table.write_text(SENSORS)
+    port = PortSettings(interface="virtual", channel="brachium-in")
+    settings = service.CanSettings(endpoint=endpoint, room="can", port=port, sensors=table, batch=2)
+    with Bus.open(endpoint) as bus, can.Bus(interface="virtual", channel="brachium-in") as wire:
+        inbox = bus.subscribe(keys.everything("can"))
+        with running(settings):
+            until(lambda: bool(bus.alive(keys.services("can", "can/*/alive"))))
+            sender = Sender(wire)
+            for number in range(40):
+                sender.mti_sample(1000 + 100 * number, 0, ("RateOfTurn",) if number == 20 else ())
+                sender.mti_sample(2**32 - 1000 + 100 * number & 2**32 - 1, 0x100, ())
+                sender.lpms_sample()
+                sender.send(0x7DF, bytes(8))
+                sender.send(0x034, b"\x00")  # too short for what it says it is
+                time.sleep(0.01)
+            heard: list[tuple[str, bytes]] = []
+
+            def complete() -> bool:
+                heard.extend(inbox.drain())
+                last = [decode(p, Status) for k, p in heard if keys.parse(k).topic == "status"]
+                return {s.node for s in last if s.received >= 38} == {"mti-1", "mti-2", "lpms-3"}
+
+            until(complete)
+        heard += inbox.drain()
+    by_topic: dict[tuple[str, str], list[bytes]] = {}
+    for key, payload in heard:
+        by_topic.setdefault((keys.parse(key).topic, keys.parse(key).detail), []).append(payload)
+    info = decode(by_topic["info", "upper_arm_r"][0], Info)
+    assert (info.node, info.chip, info.origin, info.host) == ("mti-1", "Xsens MTi-600", "worn", "can")
+    assert info.magnetometer
+    assert decode(by_topic["info", "hand_r"][0], Info).orientation_only
+    batches = [read_samples(decode(p, SampleBatch)) for p in by_topic["imu", "upper_arm_r"]]
+    numbers = [b.sequence + i for b in batches for i in range(len(b))]
+    assert numbers == [n for n in range(39) if n != 20]  # the last waits for its follower
+    for batch in batches:
+        assert batch.acc is not None
+        assert batch.gyr is not None
+        assert batch.mag is not None
+        np.testing.assert_allclose(batch.acc, np.tile(ACC, (len(batch), 1)), atol=1e-6)
+        np.testing.assert_allclose(batch.gyr, np.tile(GYR, (len(batch), 1)), atol=1e-6)
+        np.testing.assert_allclose(batch.mag, 50.0 * np.tile(MAG, (len(batch), 1)), atol=1e-4)
+        assert batch.uncertainty_ns >= 50_000_000  # nobody asked the sensor for its time
+    spans = np.diff([t for b in batches for t in b.time_ns]) / np.diff(numbers)
+    np.testing.assert_allclose(spans, 1e7, rtol=0.6)
+    turned = read_samples(decode(by_topic["imu", "hand_r"][0], SampleBatch))
+    assert turned.quat is not None
+    np.testing.assert_allclose(turned.quat[0], (0.6, 0.0, 0.8, 0.0), atol=1e-4)
+    last = decode(by_topic["status", "upper_arm_r"][-1], Status)
+    assert not last.connected
+    assert (last.lost, last.drops["bad_frame"]) == (1, 40)
+    assert last.drops["incomplete"] in (1, 2)  # the last one too, if it was given up meanwhile
+    assert decode(by_topic["status", "forearm_r"][-1], Status).lost == 0  # its time wrapped meanwhile
+    health = decode(by_topic["health", "can/can"][-1], Health)
+    assert health.drops["unknown_id"] == 40
