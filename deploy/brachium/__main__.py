@@ -8,6 +8,8 @@ COMMANDS: dict[str, str] = {
     "up": "every service that a site file names, watched and restarted",
     "router": "the room's Zenoh router",
     "gateway": "the door for wearables (WebSocket): it assigns nodes to subjects and segments",
+    "slimevr": "the door for SlimeVR trackers (UDP): those that are named come in as nodes",
+    "shimmer": "a Shimmer3 over its serial port, as a node of its own",
     "can": "a CAN bus: inertial sensors on it come in, joint angles for a machine go out",
     "emulate": "an emulated wearer, through the gateway or straight to the bus",
     "play": "a capture folder or a recording, as if it were being measured now",

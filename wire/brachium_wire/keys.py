@@ -14,6 +14,8 @@ ROOT = "brachium"
 SERVICE = "service"
 DEFAULT_ROOM = "lab"
 """The room of whoever names none."""
+REFERENCE = ".ref"
+"""What a subject's name ends in for a second set of sensors on the same person."""
 
 # One rule for everything that becomes part of a key: Zenoh itself would accept wildcards, spaces and control
 # characters, and a leading '@' hides a key from wildcards.

@@ -6,6 +6,7 @@ brachium emulate --exercise drinking --level typical --seconds 60
 """
 
 import argparse
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from brachium.option_types import probability, real, seed, whole
@@ -33,6 +34,15 @@ def configure(parser: argparse.ArgumentParser) -> None:
         default="emulated",
         choices=["emulated", "micropython"],
         help=f"micropython: the wearables' own firmware, through a gateway (default: {GATEWAY})",
+    )
+    parser.add_argument(
+        "--shimmer",
+        type=Path,
+        metavar="PORT",
+        help="wear a Shimmer3 beside the first node too; its port will be here",
+    )
+    parser.add_argument(
+        "--shimmer-delay", type=real(0.0, 1.0), default=0.02, metavar="S", help="from a sample to the port"
     )
     add_wearer(parser)
     add_faults(parser)
@@ -82,6 +92,7 @@ def settings(args: argparse.Namespace, token: str) -> "EmulateSettings":
     """Return what the options ask for; raises ValueError for what cannot be emulated."""
     from brachium_nodes.emulate import EmulateSettings
     from brachium_nodes.link import FaultSettings
+    from brachium_nodes.shimmer.emulated_port import ShimmerTwin
     from brachium_nodes.wearer import WearerSettings
 
     return EmulateSettings(
@@ -96,6 +107,7 @@ def settings(args: argparse.Namespace, token: str) -> "EmulateSettings":
         subject=args.subject,
         wearers=args.wearers,
         alike=not args.different,
+        shimmer=None if args.shimmer is None else ShimmerTwin(path=args.shimmer, delay_s=args.shimmer_delay),
         wearer=WearerSettings(
             exercise=args.exercise,
             routine=args.routine,

@@ -1,0 +1,1 @@
+"""Shimmer3 sensors (LogAndStream firmware) over their serial port as nodes."""
