@@ -12,7 +12,7 @@ it.
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from math import radians
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -21,10 +21,9 @@ from scipy.optimize import linear_sum_assignment
 from brachium_body import rotation
 from brachium_body.segments import SIDES, Segment, Side, arm_segments, part_of, side_of
 from brachium_fusion.wear_features import Felt, Motion, Rows, WearRecord, felt
+from brachium_fusion.wear_words import OTHER_MOVEMENT, TURN_WORDS, Turn, place
 
 Floats = npt.NDArray[np.float64]
-Turn = Literal["", "upside-down", "inside-out", "both"]
-
 TURNS: dict[Turn, Floats] = {
     "": rotation.IDENTITY,
     "upside-down": rotation.about(2, np.pi),
@@ -45,11 +44,6 @@ UNCLEAR = 14.0
 """Sum of squares above which a node fits nowhere: of some six normal terms one in fifty exceeds it."""
 RESTLESS_RAD = radians(6.0)
 """An arm sways by a degree or two while it hangs."""
-OTHER_MOVEMENT = (
-    "the movement that was asked for was not seen: no sensor felt an arm that hangs, is raised sideways to "
-    "shoulder height and let down, and then bends its elbow; repeat the check with these movements alone"
-)
-"""Where nothing fits, all sensors are seldom worn wrongly."""
 MARGIN = 4.0
 """Being as it should be is preferred by this much: one clear contradiction weighs more."""
 
@@ -233,31 +227,20 @@ def _still(turned: Floats) -> float:
     return float(turned @ turned) / STILL_RAD**2
 
 
-_TURN_WORDS: dict[Turn, str] = {
-    "upside-down": "is upside down: turn it round on the skin, so that its y arrow points to the shoulder",
-    "inside-out": "has its back to the outside: put it on with the other face to the skin",
-    "both": "is upside down and has its back to the outside: turn it over end to end",
-}
-
-
 def _finding(segment: Segment, seat: _Seat, nominal: dict[Segment, Floats], passes: int) -> WearFinding:
     if seat.cost - MARGIN > UNCLEAR * passes:
-        text = f"{_place(segment)}: what it felt fits no segment; look how it is worn and repeat the check"
+        text = f"{place(segment)}: what it felt fits no segment; look how it is worn and repeat the check"
         return WearFinding(segment=segment, seat=None, turn="", text=text)
     said = []
     if seat.segment != segment:
         other = seat.segment
-        said.append(f"is on the {_place(other)}")
-        said.append(f"swap it with {other}" if other in nominal else f"move it to the {_place(segment)}")
+        said.append(f"is on the {place(other)}")
+        said.append(f"swap it with {other}" if other in nominal else f"move it to the {place(segment)}")
     if seat.turn:
-        said.append(_TURN_WORDS[seat.turn])
+        said.append(TURN_WORDS[seat.turn])
     return WearFinding(
         segment=segment,
         seat=seat.segment,
         turn=seat.turn,
-        text=f"{_place(segment)}: " + ("; ".join(said) if said else "worn as it should be"),
+        text=f"{place(segment)}: " + ("; ".join(said) if said else "worn as it should be"),
     )
-
-
-def _place(segment: Segment) -> str:
-    return f"{side_of(segment) or ''} {part_of(segment).replace('_', ' ')}".strip()
