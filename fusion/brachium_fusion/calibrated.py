@@ -1,9 +1,10 @@
 """Sensor calibration applied to samples. Pure."""
 
+import msgspec
 import numpy as np
 import numpy.typing as npt
 
-from brachium_wire.messages import SensorCalibration
+from brachium_wire.messages import Info, SensorCalibration
 
 Floats = npt.NDArray[np.float64]
 
@@ -41,3 +42,8 @@ class Calibrated:
         offset, transposed = self._mag
         result: Floats = (raw - offset) @ transposed
         return result
+
+
+def recalibrated(before: Info, after: Info) -> bool:
+    """Return whether it is the same sensor, with nothing new but its calibration and who keeps it."""
+    return msgspec.structs.replace(before, calibration=after.calibration, kept=after.kept) == after

@@ -3,9 +3,12 @@
 from typing import Any
 
 from brachium_body.ranges import check_stated
+from brachium_body.segments import SEGMENTS
 from brachium_fusion.guided import MOTIONS
 from brachium_fusion.pose import POSES
 from brachium_fusion.pose_watch import STILL_S
+from brachium_fusion.sensor_guide import ALL
+from brachium_wire.sensor_records import SensorStep
 
 ZERO_S = 1.0
 """Headings are set anew after so long of stillness."""
@@ -55,3 +58,18 @@ def checked_zero(arguments: dict[str, Any]) -> dict[str, Any]:
     if set(arguments) - {"seconds"}:
         raise ValueError("zero takes seconds, how long the arms hang still, and nothing else")
     return {"seconds": checked_wish({"seconds": ZERO_S} | arguments)["seconds"]}
+
+
+def checked_sensor_wish(arguments: dict[str, Any]) -> tuple[str, list[SensorStep] | None]:
+    """Return the segment whose sensor is to be calibrated, and the steps (None: all), or raise ValueError."""
+    unknown = sorted(set(arguments) - {"sensor", "steps"})
+    if unknown:
+        raise ValueError(f"calibrate of a sensor does not know {unknown[0]!r}; it takes sensor, steps")
+    segment, steps = arguments["sensor"], arguments.get("steps")
+    if segment not in SEGMENTS:
+        raise ValueError(f"calibrate: segment {segment!r} is not known; it is one of {', '.join(SEGMENTS)}")
+    if steps is None:
+        return segment, None
+    if not isinstance(steps, list | tuple) or not steps or not set(steps) <= set(ALL):
+        raise ValueError(f"calibrate: steps are some of {', '.join(ALL)}, not {steps!r}")
+    return segment, list(steps)

@@ -1,8 +1,8 @@
-"""Fits of a sensor's own errors, from readings as the chip gives them. Pure.
+"""Fits of a gyroscope's and an accelerometer's own errors, from readings as the chip gives them. Pure.
 
-The paper's three (Tsilomitrou et al. 2021, 4.1) are `gyro_at_rest`, `accel_six_faces` and `mag_min_max`;
-`accel_still_poses` and `mag_ellipsoid` need no exact faces and find more. Each gives the part of
-messages.SensorCalibration that it found, with scores, or raises Refused with one reason.
+The paper's (Tsilomitrou et al. 2021, 4.1) are `gyro_at_rest` and `accel_six_faces`; `accel_laid_faces` and
+`accel_still_poses` need no exact faces. Each gives the part of messages.SensorCalibration that it found, with
+scores, or raises Refused with one reason. magnetometer_calibration.py has the magnetometer's.
 """
 
 from dataclasses import dataclass
@@ -32,9 +32,8 @@ COVERED = 0.08
 """Least eigenvalue of the directions' scatter; a third when they fill the sphere, 0 when one is missing."""
 ACCEL_RESIDUAL = 0.1
 """m/s^2 rms: more is no still pose, or another sensor."""
-MAG_RESIDUAL = 0.06
-"""Part of the field, a robust SD: more means that iron or a magnet was near for much of the turning."""
-MAG_ROWS = 100
+SCALE_OFF, BIAS_OFF = 0.1, 2.5
+"""Three times, and m/s^2, what data sheets of such chips allow (3 %, 150 mg): more was no lying on a face."""
 OUTWARD = 0.55
 """The field's middle must lie this deep inside the readings: on each axis both ends reach this part of it."""
 
@@ -67,7 +66,7 @@ def gyro_at_rest(gyr: Floats, acc: Floats, rate_hz: float) -> SensorFit:
     apart = np.abs(rest[:half].mean(axis=0) - rest[half:].mean(axis=0)).max()
     return SensorFit(
         method="gyro-at-rest",
-        calibration=SensorCalibration(gyro_bias=_vector(rest.mean(axis=0))),
+        calibration=SensorCalibration(gyro_bias=vector(rest.mean(axis=0))),
         scores={"rest_s": len(rest) / rate_hz, "bias_sd_dps": float(np.degrees(apart) / np.sqrt(2.0))},
     )
 
@@ -85,6 +84,21 @@ def accel_six_faces(poses: Floats) -> SensorFit:
     `poses` (k, 3) m/s^2: a face is a pose in which one axis feels nearly all of gravity. On each axis
     bias = (up + down) / 2 and scale = 2 g / (up - down).
     """
+    up, down = _face_ends(poses)
+    return _accel_fit("accel-six-faces", poses, 2.0 * GRAVITY / (up - down), (up + down) / 2.0)
+
+
+def face_of(pose: Floats) -> str:
+    """Return which axis of a still pose (3,) points up, as `-z`; empty when none does within FACE."""
+    share = pose / np.linalg.norm(pose)
+    axis = int(np.argmax(np.abs(share)))
+    if abs(share[axis]) <= FACE:
+        return ""
+    return ("+" if share[axis] > 0.0 else "-") + "xyz"[axis]
+
+
+def _face_ends(poses: Floats) -> tuple[Floats, Floats]:
+    """Return what each axis feels upwards and downwards, or raise Refused naming what is missing."""
     share = poses / np.linalg.norm(poses, axis=1, keepdims=True)
     up, down, missing = np.empty(3), np.empty(3), []
     for axis, name in enumerate("xyz"):
@@ -96,7 +110,35 @@ def accel_six_faces(poses: Floats) -> SensorFit:
                 missing.append(f"{name} {word}")
     if missing:
         raise Refused(f"no still pose with {', '.join(missing)}: lay the sensor on each of its six faces")
-    return _accel_fit("accel-six-faces", poses, 2.0 * GRAVITY / (up - down), (up + down) / 2.0)
+    return up, down
+
+
+def accel_laid_faces(poses: Floats) -> SensorFit:
+    """Return scale and bias from still poses (k, 3) m/s^2, six faces among them, laid down by hand.
+
+    Each tells that |scale (acc - bias)| = g, however it is tilted: six equations for six unknowns, where
+    `accel_six_faces` takes what a tilt takes from an axis for a part of its scale.
+    """
+    up, down = _face_ends(poses)
+    start = np.r_[2.0 * GRAVITY / (up - down), (up + down) / 2.0]
+    scale, bias = _on_sphere(poses, start)
+    if np.abs(scale - 1.0).max() > SCALE_OFF or np.abs(bias).max() > BIAS_OFF:
+        raise Refused(
+            f"no accelerometer errs by {100.0 * np.abs(scale - 1.0).max():.0f} % and "
+            f"{np.abs(bias).max():.1f} m/s^2: lay the sensor down and let go of it on every face"
+        )
+    return _accel_fit("accel-laid-faces", poses, scale, bias)
+
+
+def _on_sphere(poses: Floats, start: Floats) -> tuple[Floats, Floats]:
+    """Return scale (3,) and bias (3,) with which |scale (acc - bias)| = g at best, robustly."""
+
+    def residual(p: Floats) -> Floats:
+        lengths: Floats = np.linalg.norm(p[:3] * (poses - p[3:]), axis=1) - GRAVITY
+        return lengths
+
+    found = least_squares(residual, start, loss="soft_l1", f_scale=0.05).x
+    return found[:3], found[3:]
 
 
 def accel_still_poses(poses: Floats) -> SensorFit:
@@ -109,134 +151,36 @@ def accel_still_poses(poses: Floats) -> SensorFit:
             f"{len(poses)} still poses, {POSES} are needed: hold the sensor still, each another way"
         )
     directions = poses / np.linalg.norm(poses, axis=1, keepdims=True)
-    _check_covered(directions, "hold the sensor still in more directions, also upside down and on its sides")
+    check_covered(directions, "hold the sensor still in more directions, also upside down and on its sides")
 
-    def residual(p: Floats) -> Floats:
-        lengths: Floats = np.linalg.norm(p[:3] * (poses - p[3:]), axis=1) - GRAVITY
-        return lengths
-
-    found = least_squares(residual, np.r_[np.ones(3), np.zeros(3)], loss="soft_l1", f_scale=0.05)
-    return _accel_fit("accel-still-poses", poses, found.x[:3], found.x[3:])
+    return _accel_fit("accel-still-poses", poses, *_on_sphere(poses, np.r_[np.ones(3), np.zeros(3)]))
 
 
 def _accel_fit(method: str, poses: Floats, scale: Floats, bias: Floats) -> SensorFit:
     left = np.linalg.norm(scale * (poses - bias), axis=1) - GRAVITY
     rms = float(np.sqrt(np.mean(left**2)))
     # Six unknowns explain six faces whatever they are; what is left over then says nothing.
-    if method == "accel-still-poses" and rms > ACCEL_RESIDUAL:
+    if method != "accel-six-faces" and rms > ACCEL_RESIDUAL:
         raise Refused(
             f"gravity is still {rms:.2f} m/s^2 off between poses ({ACCEL_RESIDUAL:g} at most): "
             "hold the sensor against something firm in each pose"
         )
     return SensorFit(
         method=method,
-        calibration=SensorCalibration(accel_scale=_vector(scale), accel_bias=_vector(bias)),
+        calibration=SensorCalibration(accel_scale=vector(scale), accel_bias=vector(bias)),
         scores={"poses": float(len(poses)), "residual_m_s2": rms},
     )
 
 
-def mag_min_max(mag: Floats) -> SensorFit:
-    """Return the magnetometer's offset as the paper has it: per axis the middle of least and greatest.
-
-    `mag` (n, 3) uT while the sensor is turned in many directions.
-    """
-    low, high = mag.min(axis=0), mag.max(axis=0)
-    offset, reach = (low + high) / 2.0, (high - low) / 2.0
-    if len(mag) < MAG_ROWS or reach.min() < OUTWARD * reach.max():
-        raise Refused("the sensor was not turned through all directions: turn it slowly about every axis")
-    return SensorFit(
-        method="mag-min-max",
-        calibration=SensorCalibration(mag_offset=_vector(offset)),
-        scores=_mag_scores(mag - offset),
-    )
-
-
-def mag_ellipsoid(mag: Floats) -> SensorFit:
-    """Return hard iron (offset) and soft iron (symmetric matrix) of readings (n, 3) uT all around.
-
-    The readings lie on an ellipsoid; the matrix of determinant 1 makes it a sphere. First the general
-    quadric with least squares of its ten coefficients, then |matrix (m - offset)| = field, robust to a
-    passing magnet. A turn between magnetometer and accelerometer is not found by this.
-    """
-    if len(mag) < MAG_ROWS:
-        raise Refused(f"{len(mag)} readings, {MAG_ROWS} are needed: turn the sensor for half a minute")
-    offset, matrix = _quadric(mag)
-    centred = (mag - offset) @ matrix
-    _check_covered(
-        centred / np.linalg.norm(centred, axis=1, keepdims=True), "turn the sensor slowly about every axis"
-    )
-    field = float(np.median(np.linalg.norm(centred, axis=1)))
-    upper = np.triu_indices(3)
-
-    def residual(p: Floats) -> Floats:
-        w = np.zeros((3, 3))
-        w[upper] = p[3:]
-        w = w + np.triu(w, 1).T
-        lengths: Floats = np.linalg.norm((mag - p[:3]) @ w, axis=1) - 1.0
-        return lengths
-
-    found = least_squares(
-        residual, np.r_[offset, (matrix / field)[upper]], loss="soft_l1", f_scale=0.02, x_scale="jac"
-    )
-    offset = found.x[:3]
-    whole = np.zeros((3, 3))
-    whole[upper] = found.x[3:]
-    whole = whole + np.triu(whole, 1).T
-    matrix = whole / np.cbrt(np.linalg.det(whole))
-    scores = _mag_scores((mag - offset) @ matrix)
-    if scores["residual_part"] > MAG_RESIDUAL:
-        raise Refused(
-            f"the field varies by {100 * scores['residual_part']:.0f} % after the fit "
-            f"({100 * MAG_RESIDUAL:.0f} % at most): turn the sensor away from iron, cables and speakers"
-        )
-    return SensorFit(
-        method="mag-ellipsoid",
-        calibration=SensorCalibration(
-            mag_offset=_vector(offset),
-            mag_matrix=(_vector(matrix[0]), _vector(matrix[1]), _vector(matrix[2])),
-        ),
-        scores=scores,
-    )
-
-
-def _quadric(m: Floats) -> tuple[Floats, Floats]:
-    """Return the centre and the symmetric matrix of determinant 1 of the ellipsoid through m (n, 3)."""
-    middle, size = m.mean(axis=0), float(m.std())
-    x, y, z = ((m - middle) / size).T
-    design = np.column_stack(
-        [x * x, y * y, z * z, 2 * x * y, 2 * x * z, 2 * y * z, 2 * x, 2 * y, 2 * z, np.ones_like(x)]
-    )
-    a = np.linalg.svd(design, full_matrices=False)[2][-1]
-    shape = np.array([[a[0], a[3], a[4]], [a[3], a[1], a[5]], [a[4], a[5], a[2]]])
-    shape = shape * (np.sign(np.trace(shape)) or 1.0)
-    linear = a[6:9] * (np.sign(a[0] + a[1] + a[2]) or 1.0)
-    values, vectors = np.linalg.eigh(shape)
-    if values[0] <= 1e-3 * values[-1]:
-        raise Refused("the readings lie on no ellipsoid: turn the sensor slowly about every axis")
-    centre = -np.linalg.solve(shape, linear)
-    root = vectors @ np.diag(np.sqrt(values)) @ vectors.T
-    return centre * size + middle, root / np.cbrt(np.linalg.det(root))
-
-
-def _mag_scores(centred: Floats) -> dict[str, float]:
-    """Return the field and, as parts of it, how far readings are off: nine of ten as an SD, and all."""
-    lengths = np.linalg.norm(centred, axis=1)
-    field = float(np.median(lengths))
-    off = np.abs(lengths - field) / field
-    return {
-        "field_ut": field,
-        "residual_part": float(np.percentile(off, 90.0) / 1.645),
-        "residual_rms_part": float(np.sqrt(np.mean(off**2))),
-    }
-
-
-def _check_covered(directions: Floats, to_do: str) -> None:
+def check_covered(directions: Floats, to_do: str) -> None:
+    """Raise Refused with what to do unless unit directions (n, 3) lie all around."""
     least = np.linalg.eigvalsh(directions.T @ directions / len(directions))[0]
     both_ends = min(directions.max(axis=0).min(), -directions.min(axis=0).max())
     if least < COVERED or both_ends < OUTWARD:
         raise Refused(f"the directions do not cover all sides: {to_do}")
 
 
-def _vector(v: Floats) -> Vector:
+def vector(v: Floats) -> Vector:
+    """Return (3,) as messages have it."""
     x, y, z = v.tolist()
     return (x, y, z)

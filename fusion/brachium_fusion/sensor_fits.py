@@ -6,6 +6,7 @@ from typing import Literal, NamedTuple, get_args
 import numpy as np
 import numpy.typing as npt
 
+from brachium_fusion import magnetometer_calibration as magnetometer
 from brachium_fusion import sensor_calibration as fits
 from brachium_fusion.sensor_calibration import Refused, SensorFit
 from brachium_wire.calibration_file import Part
@@ -82,6 +83,6 @@ _FITS: dict[What, Callable[[RawSamples], SensorFit]] = {
     "gyro": _gyro,
     "accel": lambda samples: fits.accel_still_poses(_poses(samples)),
     "accel-faces": lambda samples: fits.accel_six_faces(_poses(samples)),
-    "mag": lambda samples: fits.mag_ellipsoid(_field(samples)),
-    "mag-min-max": lambda samples: fits.mag_min_max(_field(samples)),
+    "mag": lambda samples: magnetometer.mag_ellipsoid(_field(samples)),
+    "mag-min-max": lambda samples: magnetometer.mag_min_max(_field(samples)),
 }

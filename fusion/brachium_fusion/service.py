@@ -16,12 +16,13 @@ from brachium_fusion.calibration_wish import checked_wish, checked_zero
 from brachium_fusion.kept import Kept
 from brachium_fusion.pipeline import Pipeline
 from brachium_fusion.pose_watch import STILL_S
+from brachium_fusion.sensor_desk import SensorDesk
 from brachium_fusion.settings import Change, Settings
 from brachium_wire import keys
 from brachium_wire.bus import DEFAULT_ENDPOINT, Bus, Inbox
 from brachium_wire.codec import Drop, WireError, decode, decode_topic, encode
 from brachium_wire.heart import Heart
-from brachium_wire.messages import Answer, Command, Event
+from brachium_wire.messages import Answer, Calibration, Command, Event
 
 log = logging.getLogger(__name__)
 
@@ -78,6 +79,9 @@ class FusionService:
         self._lock = threading.Lock()
         kept = None if settings.keep is None else Kept(settings.keep)
         self._desk = CalibrationDesk(self._pipeline, settings.room, kept)
+        self._sensors = SensorDesk(self._pipeline)
+        self._calibrations: dict[str, Calibration] = {}
+        """What was last said of how each subject's sensors are worn."""
         for verb in ("calibrate", "zero", "record"):
             bus.serve_later(keys.commands(settings.room, verb), self._on_command)
         self._heard(bus.fetch(keys.subjects(settings.room, "imu/*/info")))
@@ -109,11 +113,13 @@ class FusionService:
         for parsed, question, reply in asked:
             self._answer(parsed, question, reply)
         self._desk.give_up()
+        self._sensors.give_up()
         self._beat()
 
     def close(self) -> None:
         """Tell the last health and who still waits for an answer."""
         self._desk.close()
+        self._sensors.close()
         self._beat(now=True)
         self._heart.end()
 
@@ -125,6 +131,8 @@ class FusionService:
             except keys.BadKey:
                 self._door[Drop.BAD_KEY.value] += 1
         self._pipeline.feed_all(parsed)
+        for place, payload in parsed:
+            self._sensors.see(place, payload)
 
     def _heard_session(self, key: str, payload: bytes) -> None:
         try:
@@ -161,11 +169,19 @@ class FusionService:
                 time.sleep(PUT_PAUSE_S)
         news, self._pipeline.calibrations = self._pipeline.calibrations, []
         for subject, calibration in news:
-            self._bus.retain(keys.calibration(self._room, subject), encode(calibration))
+            self._calibrations[subject] = calibration
+            self._tell_calibration(subject)
             for warning in calibration.warnings:
                 log.warning("%s: %s", subject, warning)
             if calibration.state in ("done", "refused"):
                 self._desk.finished(subject, calibration)
+        told, self._sensors.news = self._sensors.news, set()
+        for subject in told:
+            self._tell_calibration(subject)
+
+    def _tell_calibration(self, subject: str) -> None:
+        whole = self._sensors.complete(subject, self._calibrations.get(subject))
+        self._bus.retain(keys.calibration(self._room, subject), encode(whole))
 
     # -- commands ----------------------------------------------------------------------------------------
 
@@ -184,7 +200,9 @@ class FusionService:
             command = decode(question, Command) if question else Command()
             if key.subject not in self._pipeline.subjects:
                 raise ValueError(f"no sensor of subject {key.subject!r} has been heard yet")
-            if key.detail == "record":
+            if key.detail == "calibrate" and "sensor" in command.arguments:
+                self._sensors.begin(key.subject, command.arguments, reply)
+            elif key.detail == "record":
                 snapshot = self._pipeline.snapshot(key.subject)
                 reply(encode(Answer(ok=True, data={"snapshot": snapshot})))
             else:

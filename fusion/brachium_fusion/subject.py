@@ -1,7 +1,6 @@
 """One person's sensors: which instant can be solved, what each segment's orientation is there, and when a
-calibration pose was held. Pure; every decision rests on this subject's own messages, in order of arrival,
-and on
-changes stamped with the instant from which they hold. So a recording of them gives the same skeletons again.
+calibration pose was held. Pure; every decision rests on this subject's own messages, in order of arrival, and
+on changes stamped with the instant from which they hold. So a recording of them gives the same again.
 """
 
 from collections import Counter, deque
@@ -16,6 +15,7 @@ import numpy.typing as npt
 from brachium_body.segments import SEGMENTS, Side
 from brachium_fusion.arm_knowledge import Centres
 from brachium_fusion.binding import Binding, Known
+from brachium_fusion.calibrated import recalibrated
 from brachium_fusion.calibrating import Calibrating
 from brachium_fusion.plain_samples import plain_samples, samples_of
 from brachium_fusion.pose import Alignment
@@ -96,10 +96,12 @@ class Subject:
             return
         self._host = info.host
         track = self.tracks.get(segment)
-        if track is not None and track.info == info:
+        again = track is not None and recalibrated(track.info, info)
+        if track is not None and again and track.info.calibration == info.calibration:
+            track.info = info
             return
         if track is not None:
-            worn = info.origin == "worn"
+            worn = info.origin == "worn" or again
             self._lose(segment, mounting=not worn or track.info.node != info.node)
             if (
                 not worn
@@ -121,7 +123,7 @@ class Subject:
         if mounting:
             rest = {s: q for s, q in known.mounting.items() if s != segment}
             self.calibrating.alignment = replace(known, mounting=rest)
-        elif not track.magnetometer and not track.info.orientation_only:
+        elif not track.shares_world:
             self.calibrating.alignment = replace(known, assumed=known.assumed | {segment})
         self.revision += 1
 

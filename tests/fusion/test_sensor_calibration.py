@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
+from brachium_fusion import magnetometer_calibration as magnetometer
 from brachium_fusion import sensor_calibration as fit
 from brachium_fusion.sensor_calibration import GRAVITY, Refused
 
@@ -100,12 +101,12 @@ def test_hard_and_soft_iron_are_found(seed: int) -> None:
     matrix /= np.cbrt(np.linalg.det(matrix))
     offset = 30.0 * random.normal(size=3)
     raw = turned(1500, seed, offset, matrix)
-    found = fit.mag_ellipsoid(raw)
+    found = magnetometer.mag_ellipsoid(raw)
     assert found.calibration.mag_offset == pytest.approx(tuple(offset), abs=0.2)
     assert np.array(found.calibration.mag_matrix) == pytest.approx(matrix, abs=0.005)
     assert found.scores["field_ut"] == pytest.approx(46.0, rel=0.01)
     assert found.scores["residual_part"] < 0.015
-    simple = fit.mag_min_max(turned(1500, seed, offset, np.eye(3)))
+    simple = magnetometer.mag_min_max(turned(1500, seed, offset, np.eye(3)))
     assert simple.calibration.mag_offset == pytest.approx(tuple(offset), abs=1.5)
     assert simple.calibration.mag_matrix is None
 
@@ -114,11 +115,13 @@ def test_a_passing_magnet_does_little_and_a_lasting_one_is_refused() -> None:
     raw = turned(1500, 5, np.array([20.0, -10.0, 5.0]), np.eye(3))
     passing = raw.copy()
     passing[300:340] += [30.0, 20.0, 0.0]
-    assert fit.mag_ellipsoid(passing).calibration.mag_offset == pytest.approx((20.0, -10.0, 5.0), abs=0.6)
+    assert magnetometer.mag_ellipsoid(passing).calibration.mag_offset == pytest.approx(
+        (20.0, -10.0, 5.0), abs=0.6
+    )
     lasting = raw.copy()
     lasting[::2] += [15.0, 10.0, 0.0]
     with pytest.raises(Refused, match=r"field varies by \d+ % after the fit"):
-        fit.mag_ellipsoid(lasting)
+        magnetometer.mag_ellipsoid(lasting)
 
 
 def test_movements_that_cannot_tell_are_refused() -> None:
@@ -135,12 +138,12 @@ def test_movements_that_cannot_tell_are_refused() -> None:
     with pytest.raises(Refused, match="do not cover all sides"):
         fit.accel_still_poses(GRAVITY * flat)
     with pytest.raises(Refused, match="50 readings, 100 are needed"):
-        fit.mag_ellipsoid(turned(50, 1, np.zeros(3), np.eye(3)))
+        magnetometer.mag_ellipsoid(turned(50, 1, np.zeros(3), np.eye(3)))
     ring = turned(1000, 1, np.zeros(3), np.eye(3))
     with pytest.raises(Refused, match="turn"):
-        fit.mag_ellipsoid(ring[np.abs(ring[:, 2]) < 6.0])
+        magnetometer.mag_ellipsoid(ring[np.abs(ring[:, 2]) < 6.0])
     with pytest.raises(Refused, match="all directions"):
-        fit.mag_min_max(ring * [1.0, 1.0, 0.3])
+        magnetometer.mag_min_max(ring * [1.0, 1.0, 0.3])
 
 
 def test_moving_poses_are_refused_with_their_residual() -> None:

@@ -1,4 +1,4 @@
-"""What is known of one sensor's own errors, and how far finding them has come: parts of messages, no messages."""
+"""What is known of one sensor's own errors, and how far finding them has come: parts of messages."""
 
 from typing import Literal
 
@@ -50,8 +50,8 @@ class SensorProgress(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=Tr
     faces: list[str] = msgspec.field(default_factory=list)
     """The faces seen, by the axis that pointed up: `+x`, `-x` and so on."""
     cells: str = ""
-    """48 cells of equal area on the sphere of the field's directions in sensor axes, `#` seen and `.` not: six
-    bands from +z to -z, each of eight from -180 to 180 deg about z, 0 being +x."""
+    """48 cells of equal area on the sphere of the field's directions in sensor axes, `#` seen and `.` not:
+    six bands from +z to -z, each of eight from -180 to 180 deg about z, 0 being +x."""
     coverage: float = 0.0
     """Share of the cells seen, 0 to 1."""
     lacks: str = ""
