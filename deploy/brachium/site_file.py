@@ -13,7 +13,7 @@ import msgspec
 from brachium_body.segments import Segment
 from brachium_wire import keys
 
-ServiceName = Literal["router", "gateway", "fuse", "record", "view"]
+ServiceName = Literal["router", "gateway", "slimevr", "fuse", "record", "view"]
 SERVICES: tuple[ServiceName, ...] = get_args(ServiceName)
 
 Quaternion = tuple[float, float, float, float]
@@ -72,12 +72,25 @@ class Node(_Table, frozen=True, kw_only=True):
     mounting: Quaternion | None = None
 
 
+class Tracker(_Table, frozen=True, kw_only=True):
+    """A sensor of a SlimeVR tracker and where it is worn."""
+
+    mac: str
+    subject: str
+    segment: Segment | None = None
+    """Left out: where the tracker itself says that it is worn."""
+    sensor: int | None = None
+    mounting: Quaternion | None = None
+    rate_hz: float = 100.0
+
+
 class Site(_Table, frozen=True, kw_only=True):
     """The whole file."""
 
     room: Room
     subject: tuple[Subject, ...] = ()
     node: tuple[Node, ...] = ()
+    tracker: tuple[Tracker, ...] = ()
 
 
 def find(name: str) -> Path:
@@ -144,8 +157,14 @@ def _check(site: Site) -> None:
         raise BadSite(str(error)) from None
     subjects = _once([subject.id for subject in site.subject], "subject")
     _once([node.id for node in site.node], "node")
-    places = [f"{node.segment} of {node.subject}" for node in site.node if node.segment is not None]
+    worn = (*site.node, *site.tracker)
+    places = [f"{one.segment} of {one.subject}" for one in worn if one.segment is not None]
     _once(places, "sensor place")
+    for tracker in site.tracker:
+        if tracker.subject not in subjects:
+            raise BadSite(
+                f"tracker {tracker.mac!r} names subject {tracker.subject!r}, which no [[subject]] has"
+            )
     for node in site.node:
         if (node.subject is None) != (node.segment is None):
             raise BadSite(f"node {node.id!r}: give both subject and segment, or neither")

@@ -21,7 +21,14 @@ class Service:
     """Where it listens."""
 
 
-KINDS = {"router": "router", "gateway": "gateway", "fuse": "fusion", "record": "recorder", "view": "view"}
+KINDS = {
+    "router": "router",
+    "gateway": "gateway",
+    "slimevr": "slimevr",
+    "fuse": "fusion",
+    "record": "recorder",
+    "view": "view",
+}
 
 
 def endpoint(site: Site) -> str:
@@ -50,6 +57,7 @@ def services(site: Site, path: Path, *, join_token: str, users_file: Path | None
     words = {
         "router": ["router", "--room", room.id, "--bind", room.bind, "--port", str(room.ports.router)],
         "gateway": ["gateway", *network, "--bind", room.bind, "--port", str(room.ports.gateway)],
+        "slimevr": ["slimevr", *network, "--bind", room.bind, "--site", str(path)],
         "fuse": ["fuse", *network],
         "record": ["record", *network, "--out", room.recordings],
         "view": ["view", *network, "--web", "--web-port", str(room.ports.web)],

@@ -144,13 +144,13 @@ class Calibrating:
 
     def _take_pose(self, held: HeldPose, tracks: Mapping[str, SegmentTrack], session: Session) -> None:
         if self._zeroing and self.alignment is not None:
-            common = frozenset(s for s in held.world_from_sensor if _shares_world(tracks[s]))
+            common = frozenset(s for s in held.world_from_sensor if tracks[s].shares_world)
             self.alignment = zeroed(self.alignment, held.world_from_sensor, common)
             return
         sensors = {
             segment: PoseSensor(
                 world_from_sensor=quats,
-                magnetometer=_shares_world(tracks[segment]),
+                magnetometer=tracks[segment].shares_world,
                 nominal_mounting=_array(tracks[segment].info.mounting),
             )
             for segment, quats in held.world_from_sensor.items()
@@ -209,10 +209,6 @@ class Calibrating:
         self._zeroing, self._fitting_ns = state["zeroing"], state["fitting_ns"]
         self.alignment = None if state["alignment"] is None else Alignment.from_state(state["alignment"])
         self.reference_ns = state["reference_ns"]
-
-
-def _shares_world(track: SegmentTrack) -> bool:
-    return track.magnetometer or track.info.orientation_only
 
 
 def _array(values: Quaternion | None) -> Floats | None:

@@ -59,7 +59,7 @@ class MotionRecord:
                 world_from_sensor = steady(world_from_sensor, block[:, 4:7], block[:, 7:], rate_hz)
             found[segment] = SensorRecord(
                 world_from_sensor=world_from_sensor,
-                magnetometer=track.magnetometer or not raw,
+                magnetometer=track.shares_world,
                 nominal_mounting=None if track.info.mounting is None else np.array(track.info.mounting),
                 gyr=block[:, 4:7] if raw else None,
                 acc=block[:, 7:] if raw else None,

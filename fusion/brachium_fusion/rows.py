@@ -144,8 +144,7 @@ def _frame(subject: Subject, instant: Instant, side: Side) -> Frame:
         stated=stated_angles(instant.session),
         forward=alignment.forward,
         origin="emulated" if "emulated" in origins else "playback" if "playback" in origins else "worn",
-        drifts=not any(t.magnetometer or t.info.orientation_only for t in tracks)
-        and "sternum" not in subject.tracks,
+        drifts=not any(t.shares_world for t in tracks) and "sternum" not in subject.tracks,
         sternum="sternum" in alignment.mounting,
     )
     subject.frames[side] = frame

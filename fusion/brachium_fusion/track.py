@@ -51,13 +51,18 @@ class SegmentTrack:
         self._disturbed_since: int | None = None
         self._settled_ns = 0
         self.restarts = 0
-        """How often the filter lost its heading by a long gap."""
+        """How often the filter, or a sensor that runs its own, may have lost its heading by a long gap."""
         self.reboots = 0
         """How often the node began to number anew."""
         self._calibrated = Calibrated(info.calibration)
 
     def _new_filter(self) -> OrientationFilter:
         return make(self._filter_name, 1.0 / self.info.rate_hz, self.magnetometer)
+
+    @property
+    def shares_world(self) -> bool:
+        """Whether its world's heading is the common one: magnetic north holds it, or another reference."""
+        return self.magnetometer or (self.info.orientation_only and not self.info.heading_free)
 
     def feed(self, samples: Samples, drops: Counter[str]) -> bool:
         """Take a batch; return False, with the reason counted in samples, when it cannot be used."""
@@ -134,6 +139,8 @@ class SegmentTrack:
         kind: Quality | None = None
         if self.timeline and silence > 2.5e9 / self.info.rate_hz:
             kind = "held" if silence <= BRIDGE_NS else "missing"
+            if self.info.heading_free and silence > RESTART_NS:
+                self.restarts += 1  # switched off and on it would have another heading
         previous = self.timeline.last.quats[-1] if self.timeline else quats[0]
         steps = rotation.angle_between(np.vstack([previous, quats[:-1]]), quats) * self.info.rate_hz
         self._note_still(np.column_stack([steps, np.zeros((len(steps), 2))]), samples.time_ns)

@@ -80,6 +80,11 @@ async def answer_seekers(
             transport.close()
 
 
+def broadcast_address(address: str) -> str:
+    """Return where broadcasts arrive that reach the IPv4 address of an interface."""
+    return "127.255.255.255" if ipaddress.ip_address(address).is_loopback else "255.255.255.255"
+
+
 async def _listen(
     address: str, port: int, protocol: Callable[[], asyncio.DatagramProtocol]
 ) -> asyncio.BaseTransport:
@@ -89,7 +94,7 @@ async def _listen(
     door = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     try:
         door.setblocking(False)
-        door.bind(("127.255.255.255" if here.is_loopback else "255.255.255.255", port))
+        door.bind((broadcast_address(address), port))
         transport, _ = await asyncio.get_running_loop().create_datagram_endpoint(protocol, sock=door)
     except OSError:
         door.close()
