@@ -1,7 +1,7 @@
 """A node's WebSocket at the gateway: the handshake, then frames, and an end that always comes.
 
-The library that does the handshake (websockets) takes some 50 us for each message afterwards; 256 nodes would
-fill a quarter of a core with that alone, so the frames are read here, in the event loop's own callback.
+The library of the handshake (websockets) takes some 50 us for each message afterwards, with 256 nodes a quarter
+of a core: the frames are read here, in the event loop's own callback.
 """
 
 import asyncio
@@ -237,8 +237,7 @@ class NodeSocket(asyncio.BufferedProtocol):
             self._house.broken("broken_websocket")
         self.close(broken.code, str(broken))
         self._reader = _Deaf(0)
-        assert self._transport is not None
-        if self._transport.can_write_eof():
+        if self._transport is not None and self._transport.can_write_eof():
             self._transport.write_eof()
 
 
