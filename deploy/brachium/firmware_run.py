@@ -16,8 +16,10 @@ from brachium.shell import Failed
 from brachium.stalling_relay import StallingRelay
 from brachium.way_in import node_table
 from brachium_body.segments import Segment
+from brachium_nodes.emulated_board.board import Counts
+from brachium_nodes.emulated_board.settings import BoardSettings
 from brachium_nodes.firmware_build import build
-from brachium_nodes.firmware_host import BoardSettings, FirmwareNode, FirmwareReport, prepare, stop_all
+from brachium_nodes.firmware_host import FirmwareNode, prepare, stop_all
 from brachium_nodes.gateway import token_sha256
 from brachium_nodes.roster import NodeEntry
 from brachium_nodes.wearer import Wearer, WearerSettings
@@ -44,9 +46,11 @@ class FirmwareFigures:
     events: list[str]
     """What was done to the network, in order."""
     samples: dict[str, SampleFigures]
-    boards: dict[str, FirmwareReport]
+    boards: dict[str, Counts]
     heap_peak_k: float
-    """The largest of all nodes, in K of the chip's 36; the board's emulation not counted."""
+    """The firmware's own, the largest of all nodes, in K of the chip's 36."""
+    heap_shim_k: float
+    """What stands for the chip's own modules in the same 36 K, beside it; a chip has these in its program."""
     refused_tokens: int
     """Nodes that were told 401 first."""
     skeletons: int
@@ -87,9 +91,7 @@ class FirmwareRun:
                 self._wait(lambda: len(heard.joined()) == len(WORN), "the nodes' welcome")
                 self._pass(relay, stop)
             finally:
-                reports: dict[Segment, FirmwareReport] = dict(
-                    zip(nodes, stop_all(nodes.values()), strict=True)
-                )
+                reports: dict[Segment, Counts] = dict(zip(nodes, stop_all(nodes.values()), strict=True))
             refused = sum("this node's token" in node.said() for node in nodes.values())
             stop.wait(1.0)
             heard.drain()
@@ -170,9 +172,7 @@ class FirmwareRun:
                 raise Failed(f"after {JOIN_S:g} s there is still no sign of {what}")
             time.sleep(0.05)
 
-    def _figures(
-        self, heard: "_Heard", reports: dict[Segment, FirmwareReport], refused: int
-    ) -> FirmwareFigures:
+    def _figures(self, heard: "_Heard", reports: dict[Segment, Counts], refused: int) -> FirmwareFigures:
         samples: dict[str, SampleFigures] = {}
         for segment, rate_hz in WORN.items():
             wearer = Wearer(WearerSettings(rate_hz=rate_hz, mag_every=1, segments=(segment,), seed=3))
@@ -187,7 +187,8 @@ class FirmwareRun:
             events=self.events,
             samples=samples,
             boards={str(segment): report for segment, report in reports.items()},
-            heap_peak_k=max((r.heap_peak - r.heap_board) / WORD for r in reports.values()),
+            heap_peak_k=max((r.heap_peak - r.heap_shim) / WORD for r in reports.values()),
+            heap_shim_k=max(r.heap_shim / WORD for r in reports.values()),
             refused_tokens=refused,
             skeletons=heard.skeletons,
         )

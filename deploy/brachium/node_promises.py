@@ -23,6 +23,7 @@ def _firmware(run: str) -> Proof:
             Promise(name="late", unit="samples", take=_worst("late")),
             Promise(name="rate off", unit="%", take=_worst("rate_off_percent"), at_most=0.1),
             figure("memory of the chip's 36", "K", "heap_peak_k", at_most=30),
+            figure("the chip's own modules beside it", "K", "heap_shim_k"),
             figure("skeletons", "1", "skeletons"),
         ),
     )

@@ -10,9 +10,8 @@ PACKAGES = Path(__file__).parent
 FIRMWARE = PACKAGES / "firmware"
 """What is flashed."""
 BOARD = PACKAGES / "simulated_board"
-HEAP = "44wK"
-"""As much memory for objects as an ESP8266 leaves, 36 K, and 8 K for the board's emulation; `w` makes up for
-this host's larger words."""
+HEAP = "36wK"
+"""As much memory for objects as an ESP8266 leaves; `w` makes up for this host's larger words."""
 
 
 class NoMicroPython(RuntimeError):

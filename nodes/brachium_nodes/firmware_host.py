@@ -1,71 +1,34 @@
 """Runs the wearables' own firmware on this host: MicroPython, and an emulated board on an emulated person."""
 
 import json
+import os
+import signal
 import subprocess
+import sys
 from collections.abc import Iterable
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
 from brachium_body.segments import Segment
-from brachium_nodes.firmware_build import BOARD, Build, micropython
+from brachium_nodes.emulated_board import serve
+from brachium_nodes.emulated_board.board import Counts
+from brachium_nodes.emulated_board.feed import FeedSettings
+from brachium_nodes.emulated_board.settings import BoardSettings, ChipName, write_board
+from brachium_nodes.firmware_build import BOARD, PACKAGES, Build, micropython
 from brachium_nodes.wearer import Wearer
 from brachium_wire.messages import SensorCalibration
 
 ENDS_WITHIN_S = 6.0
 
-ChipName = Literal["MPU-9150", "MPU-9250", "ICM-42688-P"]
 ACC_STEP = 9.80665 / 4096
 """m/s^2: 8 g, as the firmware configures every chip."""
 GYR_STEP = np.pi / 180.0 / 16.4
 """rad/s: 2000 deg/s."""
 MAG_STEPS: dict[ChipName, float] = {"MPU-9150": 0.3, "MPU-9250": 0.15, "ICM-42688-P": 0.3}
 """uT."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class BoardSettings:
-    """One emulated board and what is wrong with it."""
-
-    chip: ChipName = "MPU-9150"
-    ticks_ppm: int = 40
-    """How much faster the chip's ticks run than true time."""
-    ticks_shift_us: int = 0
-    refusals: float = 0.0
-    """Probability that the bus refuses a transfer."""
-    stall_us: int | None = None
-    """When the bus stands still once, after the first sample, and for how long."""
-    stall_ms: int = 0
-    field_us: int = 7300
-    """How long the magnetometer takes for one measurement."""
-    field_adjust: tuple[int, int, int] = (150, 128, 100)
-    """The magnetometer's adjustment as the factory wrote it, one byte an axis."""
-    send_buffer: int = 4096
-    rssi_dbm: int = -58
-    battery: dict[str, float] = field(
-        default_factory=lambda: {"full_v": 4.1, "fall_v_per_s": 2e-5, "full_scale_v": 5.0}
-    )
-
-
-@dataclass(frozen=True, kw_only=True)
-class FirmwareReport:
-    """What a board noted while its node ran."""
-
-    transactions: int
-    refused: int
-    """Transfers that the bus refused."""
-    overflows: int
-    """How often the sensor's FIFO ran over."""
-    longest_unfed_ms: int
-    """The longest that the watchdog waited."""
-    heap_size: int
-    """Bytes of memory for objects."""
-    heap_peak: int
-    """Of these, in use at most, garbage and the board's emulation included."""
-    heap_board: int
-    """What the board's emulation takes of it; no chip has that."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -76,12 +39,20 @@ class FirmwareNode:
     process: "subprocess.Popen[bytes]"
 
     @classmethod
-    def start(cls, folder: Path, made: Build) -> "FirmwareNode":
-        """Switch on the node that was prepared in `folder`. Raises NoMicroPython."""
-        words = [*micropython(), str(BOARD / "run.py"), str(made.board), str(made.firmware)]
+    def start(cls, folder: Path, made: Build, *, serial: int = subprocess.DEVNULL) -> "FirmwareNode":
+        """Switch on the node that was prepared in `folder`; it reads `serial`. Raises NoMicroPython."""
+        words = [sys.executable, "-m", serve.__name__, str(folder)]
+        words += [*micropython(), str(BOARD / "run.py"), str(made.board), str(made.firmware)]
+        environment = {**os.environ, "PYTHONPATH": str(PACKAGES.parent)}
         with (folder / "serial.txt").open("ab") as said:
             process = subprocess.Popen(
-                words, cwd=folder, stdin=subprocess.DEVNULL, stdout=said, stderr=said, start_new_session=True
+                words,
+                cwd=folder,
+                env=environment,
+                stdin=serial,
+                stdout=said,
+                stderr=said,
+                start_new_session=True,
             )
         return cls(folder, process)
 
@@ -89,21 +60,20 @@ class FirmwareNode:
         """Return what it wrote on its serial line."""
         return (self.folder / "serial.txt").read_text("utf-8", "replace")
 
-    def stop(self) -> FirmwareReport:
+    def stop(self) -> Counts:
         """Interrupt it as over the serial line; it says bye. Raises RuntimeError when it failed."""
-        (self.folder / "stop").touch()
+        self.process.terminate()
         try:
             code = self.process.wait(ENDS_WITHIN_S)
         except subprocess.TimeoutExpired:
-            self.process.kill()
-            self.process.wait()
-            code = -9
+            os.killpg(self.process.pid, signal.SIGKILL)
+            code = self.process.wait()
         if code != 0:
             raise RuntimeError(f"the firmware ended with {code}: {self.said()[-2000:]}")
-        return FirmwareReport(**json.loads((self.folder / "report.json").read_text("utf-8")))
+        return Counts(**json.loads((self.folder / serve.REPORT).read_text("utf-8")))
 
 
-def stop_all(nodes: Iterable[FirmwareNode]) -> list[FirmwareReport]:
+def stop_all(nodes: Iterable[FirmwareNode]) -> list[Counts]:
     """Stop every node, in order. Raises RuntimeError for the first that failed, when all have stopped."""
     reports, errors = [], []
     for node in nodes:
@@ -128,24 +98,21 @@ def prepare(
     board = board or BoardSettings()
     folder.mkdir(parents=True, exist_ok=True)
     clock, rate_hz = wearer.clocks[segment], wearer.settings.rate_hz
-    (folder / "stop").unlink(missing_ok=True)
     (folder / "samples.bin").write_bytes(feed(wearer, segment, board, 0, int(seconds * rate_hz)))
-    about = {
-        "feed": {
-            "path": "samples.bin",
-            "start_us": start_us + round(1e6 * clock.phase_s),
-            "period_ns": round(1e9 * clock.period_s),
-            "rate_hz": rate_hz,
-        },
-        **asdict(board),
-    }
+    about = FeedSettings(
+        path="samples.bin",
+        start_us=start_us + round(1e6 * clock.phase_s),
+        period_ns=round(1e9 * clock.period_s),
+        rate_hz=rate_hz,
+    )
+    write_board(folder, board, about)
     configuration = {
         "id": node,
         "token": token,
         "gateway": gateway,
         "origin": "emulated",
         "rate_hz": rate_hz,
-        "battery": {"pin": 0, "full_scale_v": board.battery["full_scale_v"]},
+        "battery": {"pin": 0, "full_scale_v": board.cell.full_scale_v},
         **more,
     }
     calibration = {
@@ -153,7 +120,7 @@ def prepare(
         for name, value in kept_calibration(wearer.chips[segment].calibration).items()
         if board.chip != "ICM-42688-P" or not name.startswith("mag")
     }
-    for name, content in (("board", about), ("brachium", configuration), ("calibration", calibration)):
+    for name, content in (("brachium", configuration), ("calibration", calibration)):
         (folder / f"{name}.json").write_text(json.dumps(content), encoding="utf-8")
 
 

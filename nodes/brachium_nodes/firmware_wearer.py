@@ -9,9 +9,10 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from brachium_body.segments import Segment
+from brachium_nodes.emulated_board.settings import BoardSettings
 from brachium_nodes.emulated_nodes import node_id
 from brachium_nodes.firmware_build import build
-from brachium_nodes.firmware_host import BoardSettings, FirmwareNode, feed, prepare, stop_all
+from brachium_nodes.firmware_host import FirmwareNode, feed, prepare, stop_all
 from brachium_nodes.node_stream import Stop, StreamCount, Timeline
 from brachium_nodes.wearer import Wearer
 

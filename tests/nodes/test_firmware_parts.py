@@ -159,13 +159,14 @@ print(json.dumps([seen, latest, earliest, clock.period / 256 / period]))
 
 
 def test_what_a_cell_has_left_falls_with_its_voltage(on_chip):
-    lines = (
-        "from battery import share_left\nprint(json.dumps([share_left(3.0 + k / 100) for k in range(130)]))"
-    )
-    shares = on_chip(lines)
+    lines = """
+from battery import share_left
+print(json.dumps([int(1e6 * share_left(v)) for v in given]))
+"""
+    shares = [1e-6 * share for share in on_chip(lines, [3.0 + k / 50 for k in range(65)])]
     assert (shares[0], shares[-1]) == (0.0, 1.0)
     assert all(a <= b for a, b in pairwise(shares))
-    assert shares[70] == pytest.approx(0.35)
+    assert shares[40] == pytest.approx(0.47, abs=1e-3)  # 3.8 V
 
 
 def test_a_cell_is_spared_when_it_is_empty_and_not_for_one_sag(on_chip):

@@ -15,6 +15,7 @@ about = configuration.load()
 del sys.modules["configuration"], configuration
 batches = Batches(about["batch"], max(1, int(about["queue_s"] * about["rate_hz"] / about["batch"])))
 gc.collect()
+gc.threshold(512)  # little garbage at a time: what is free stays in one piece
 
 import asyncio
 
@@ -47,8 +48,6 @@ def start():
             time.sleep_ms(TRY_SENSOR_MS)
     battery = Battery(machine.ADC(wired["pin"]) if wired["pin"] >= 0 else None, wired)
     node = Node(about, sensor, batches, clock, battery, Radio(wifi["name"], wifi["password"]), feed)
-    gc.collect()
-    gc.threshold(512)  # little garbage at a time: what is free stays in one piece
     try:
         asyncio.run(node.run())
     except KeyboardInterrupt:

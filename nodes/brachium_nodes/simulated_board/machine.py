@@ -3,60 +3,79 @@
 import sys
 
 import board
-import chips
-
-_SILENCE_US = 3_200_000
 
 
 class Pin:
     """A pin by its number."""
 
     def __init__(self, number):
-        self.number = number
+        pass
 
 
 class ADC:
-    """The converter that sees the battery: its voltage falls evenly."""
+    """The converter that sees the battery."""
 
     def __init__(self, number):
-        about = board.SETTINGS["battery"]
-        self._from_us = board.true_us()
-        self._full_v, self._fall = about["full_v"], about["fall_v_per_s"]
-        self._scale_v = about["full_scale_v"]
+        self._two = bytearray(2)
 
     def read_u16(self):
         """Return the voltage, 65535 at full scale."""
-        volts = self._full_v - self._fall * 1e-6 * (board.true_us() - self._from_us)
-        return max(0, min(65535, int(65535 * volts / self._scale_v)))
+        board.ask(97, into=self._two)
+        return self._two[0] | self._two[1] << 8
 
 
 class WDT:
-    """Notes for how long nobody fed it."""
+    """The watchdog; it barks on the board's side."""
 
     def __init__(self):
-        self._fed = board.true_us()
+        self._one = bytearray(1)
 
     def feed(self):
         """Feed it."""
-        now = board.true_us()
-        board.COUNTS["longest_unfed_ms"] = max(board.COUNTS["longest_unfed_ms"], (now - self._fed) // 1000)
-        self._fed = now
-        if board.stopped():
+        board.ask(102, into=self._one)
+        if self._one[0]:
             raise KeyboardInterrupt  # as Ctrl-C on the serial line
+
+
+class SoftI2C:
+    """The bus with the emulated chip on it."""
+
+    def __init__(self, scl, sda, freq):
+        pass
+
+    def readfrom_mem(self, address, register, size):
+        """Return `size` bytes."""
+        data = bytearray(size)
+        self.readfrom_mem_into(address, register, data)
+        return data
+
+    def readfrom_mem_into(self, address, register, data):
+        """Fill `data`, or raise OSError before anything was read."""
+        board.ask(114, address, register, len(data), data)
+
+    def writeto_mem(self, address, register, data):
+        """Write, or raise OSError before anything was written."""
+        board.ask(119, address, register, data[0])
+
+
+def I2C(number, scl, sda, freq):
+    """Return the bus with the emulated chip on it."""
+    return SoftI2C(scl, sda, freq)
 
 
 def freq(hz):
     """Set the clock of the processor."""
 
 
-def SoftI2C(scl, sda, freq):
-    """Return the bus with the emulated chip on it."""
-    return chips.bus()
+def unique_id():
+    """Return the chip's own number."""
+    return b"\xe5\x3f\x21"
 
 
-def I2C(number, scl, sda, freq):
-    """Return the bus with the emulated chip on it."""
-    return chips.bus()
+def reset():
+    """Start anew."""
+    board.ask(122)
+    sys.exit(0)
 
 
 def deepsleep():

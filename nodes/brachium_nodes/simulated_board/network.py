@@ -2,14 +2,15 @@
 
 import board
 
-STA_IF = 0
+STA_IF, AP_IF = 0, 1
 
 
 class WLAN:
-    """The station."""
+    """The station, or the access point."""
 
     def __init__(self, interface):
         self._active = True
+        self._one = bytearray(1)
 
     def isconnected(self):
         """Return whether there is a network."""
@@ -22,6 +23,10 @@ class WLAN:
     def connect(self, name, password):
         """Join."""
 
+    def config(self, **about):
+        """Set up the access point."""
+
     def status(self, what):
         """Return the signal in dBm."""
-        return board.SETTINGS["rssi_dbm"]
+        board.ask(115, into=self._one)
+        return self._one[0] - 256 if self._one[0] > 127 else self._one[0]

@@ -1,4 +1,7 @@
-"""Runs a node's firmware on this host, in the node's folder: micropython run.py BOARD FIRMWARE."""
+"""Runs a node's firmware on this host, in the node's folder; the board starts it.
+
+micropython run.py BOARD FIRMWARE LINE PPM SHIFT SEND_BUFFER WEB_PORT
+"""
 
 import sys
 
@@ -16,11 +19,10 @@ import network
 import socket
 import time
 
-machine.SoftI2C(None, None, None)
 gc.collect()
-board.COUNTS["heap_board"] = gc.mem_alloc() - before
+board.HEAP[1] = gc.mem_alloc() - before
 
 try:
     import main
 finally:
-    board.report()
+    board.tell_heap()

@@ -7,8 +7,6 @@ import board
 import utime
 
 _WRAP = 1 << 30
-_PPM = board.SETTINGS["ticks_ppm"]
-_SHIFT_US = board.SETTINGS["ticks_shift_us"]
 
 
 def __getattr__(name):
@@ -18,7 +16,7 @@ def __getattr__(name):
 def ticks_us():
     """Return microseconds, modulo 2^30."""
     true = utime.ticks_us()
-    return (true + true * _PPM // 1_000_000 + _SHIFT_US) % _WRAP
+    return (true + true * board.PPM // 1_000_000 + board.SHIFT_US) % _WRAP
 
 
 def ticks_diff(end, start):
