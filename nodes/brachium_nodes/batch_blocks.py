@@ -10,7 +10,7 @@ from brachium_nodes.clock import Integers
 from brachium_nodes.node_frames import MAX_FRAME_SAMPLES, MAX_SPAN_US, Batch, Hello
 from brachium_wire.codec import Drop, WireError
 from brachium_wire.messages import SampleBatch, Vector
-from brachium_wire.samples import read_samples
+from brachium_wire.samples import MAX_GYR, read_samples
 
 MAX_SEQUENCE = 1 << 48
 MAX_DEVICE_US = 1 << 53
@@ -57,8 +57,28 @@ def measure(frame: Batch, hello: Hello) -> Measured:
         quat=frame.quat,
         late=frame.late,
     )
-    read_samples(batch)  # the one check of shapes, finiteness and ranges
+    if not _plainly_sound(batch, n):
+        read_samples(batch)  # the one check of shapes, finiteness and ranges; it says what is wrong
     return Measured(batch, np.array(offsets, dtype=np.int64) + frame.device_us)
+
+
+def _plainly_sound(batch: SampleBatch, n: int) -> bool:
+    """Return whether nothing can be wrong with the blocks, as with nearly all batches, at a tenth of the time."""
+    acc, gyr, mag, index = batch.acc, batch.gyr, batch.mag, batch.mag_index
+    if acc is None or gyr is None or batch.quat is not None or not len(acc) == len(gyr) == 12 * n:
+        return False
+    if mag is None:
+        if index is not None:
+            return False
+    elif index is None:
+        if len(mag) != 12 * n:
+            return False
+    else:
+        which = unpack(f"<{len(index) // 2}H", index) if len(index) % 2 == 0 else ()
+        if not which or len(mag) != 12 * len(which) or which[-1] >= n or not all(map(lt, which, which[1:])):
+            return False
+    numbers = np.frombuffer(b"".join((acc, gyr, mag or b"")), dtype="<f4")
+    return bool(np.maximum.reduce(np.abs(numbers)) <= MAX_GYR)  # the smallest limit; NaN compares false
 
 
 def _si(block: bytes | None, scale: Vector | None, big_endian: bool) -> bytes | None:

@@ -1,7 +1,7 @@
 """A node's WebSocket at the gateway: the handshake, then frames, and an end that always comes.
 
-The library of the handshake (websockets) takes some 50 us for each message afterwards, with 256 nodes a quarter
-of a core: the frames are read here, in the event loop's own callback.
+The library of the handshake (websockets) takes some 50 us for each message afterwards, with 256 nodes a
+quarter of a core: the frames are read here, in the event loop's own callback.
 """
 
 import asyncio

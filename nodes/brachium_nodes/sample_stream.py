@@ -2,6 +2,7 @@
 
 from collections import Counter
 from dataclasses import dataclass, field
+from struct import pack
 
 import msgspec
 
@@ -43,14 +44,15 @@ def stamp(measured: Measured, memory: Memory, place: SegmentMemory, received_ns:
 
     Raises WireError for times that cannot be: then nothing is counted.
     """
-    batch, clock, newest_us = measured.batch, memory.clock, int(measured.device_us[-1])
+    device_us: list[int] = measured.device_us.tolist()
+    batch, clock, newest_us = measured.batch, memory.clock, device_us[-1]
     expected = memory.counter.next
     in_order = not batch.late and (expected is None or batch.sequence >= expected)
-    if in_order and measured.device_us[0] <= memory.newest_us:
+    if in_order and device_us[0] <= memory.newest_us:
         raise WireError(Drop.TIME_BACKWARDS, f"batch/1: t {batch.device_us} is not after the sample before")
     if not clock.known:
         clock.arrival(newest_us, received_ns)
-    times = clock.host_ns(measured.device_us)
+    times = clock.host_times(device_us)
     if times[0] <= 0 or times[-1] > received_ns + clock.uncertainty_ns(newest_us) + MAX_AHEAD_NS:
         raise WireError(Drop.OUT_OF_RANGE, f"batch/1: t {batch.device_us} lies in the future")
     if in_order:
@@ -63,13 +65,14 @@ def stamp(measured: Measured, memory: Memory, place: SegmentMemory, received_ns:
     sequence = batch.sequence + memory.base
     if in_order:
         memory.newest_us = newest_us
-        times = times + max(0, place.newest_ns + 1 - int(times[0]))  # another node or boot was here before
-        place.newest_ns, place.next_sequence = int(times[-1]), sequence + len(measured)
+        if times[0] <= place.newest_ns:  # another node or boot was here before
+            times = [t + place.newest_ns + 1 - times[0] for t in times]
+        place.newest_ns, place.next_sequence = times[-1], sequence + len(measured)
     return msgspec.structs.replace(
         batch,
         sequence=sequence,
-        time_ns=int(times[0]),
-        offsets=(times - times[0]).astype("<u4").tobytes(),
+        time_ns=times[0],
+        offsets=pack(f"<{len(times)}I", *[t - times[0] for t in times]),
         received_ns=received_ns,
         uncertainty_ns=clock.uncertainty_ns(newest_us),
     )

@@ -51,6 +51,7 @@ class Key(NamedTuple):
     detail: str
 
 
+@lru_cache(maxsize=4096)  # a gateway of a full room asks for it thousands of times a second
 def imu(room: str, subject: str, segment: str) -> str:
     """Return the key of a segment's sensor batches."""
     return f"{_subject(room, subject)}/imu/{chunk(segment, 'segment')}"
