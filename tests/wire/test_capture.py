@@ -73,7 +73,11 @@ def test_a_capture_comes_back(
     segments: dict[Any, CaptureSegment] = {
         "hand_l": CaptureSegment(t=t, rate_hz=1.0, quat=quat / np.linalg.norm(quat, axis=1, keepdims=True)),
         "forearm_l": CaptureSegment(
-            t=t + 0.02, rate_hz=1.0, acc=random.normal(size=(n, 3)), gyr=random.normal(size=(n, 3)), mag=mag
+            t=t + 0.02,
+            rate_hz=1.0,
+            acc=random.normal(size=(n, 3)) + np.array([0.0, 0.0, 9.8]),
+            gyr=random.normal(size=(n, 3)),
+            mag=mag,
         ),
     }
     path = tmp_path_factory.mktemp("c") / "capture"
@@ -249,12 +253,42 @@ def test_one_segment_in_two_files_is_refused(tmp_path: Path) -> None:
         capture.load(path)
 
 
-def test_other_units_are_doubted_aloud(tmp_path: Path) -> None:
-    text = HEAD + "0.00,0,0,1.0,0,0,0\n0.01,0,0,1.0,250,0,0\n0.02,0,0,1.0,9,0,0\n"
+def test_accelerations_that_are_far_too_large_are_doubted_aloud(tmp_path: Path) -> None:
+    text = HEAD + "0.00,0,0,32.2,0,0,0\n0.01,0,0,32.2,250,0,0\n0.02,0,0,32.2,9,0,0\n"
     assert [w.split(":")[1][:20] for w in capture.load(folder(tmp_path, text)).warnings] == [
         " half of all acceler",
         " 1 row left out, bec",
     ]
+
+
+@pytest.mark.parametrize(
+    ("size", "said"), [(1.0, "looks like g: multiply by 9.80665"), (0.1, "is gravity taken out of them")]
+)
+def test_accelerations_without_gravity_are_refused(tmp_path: Path, size: float, said: str) -> None:
+    rows = ROWS.replace("9.81", f"{size}")
+    with pytest.raises(CaptureError, match=rf"forearm_r\.csv: .* expected m/s\^2 .*{said}"):
+        capture.load(folder(tmp_path, HEAD + rows))
+
+
+def turning(unit: float, largest: float, seconds: float = 20.0) -> str:
+    """Return a sensor that is tilted to and fro about x by a known rate, its rates times `unit`."""
+    t = np.arange(round(50.0 * seconds)) / 50.0
+    tilt = largest / 2.0 * np.sin(2.0 * t)
+    rate = unit * largest * np.cos(2.0 * t)
+    rows = zip(t, 9.81 * np.sin(tilt), 9.81 * np.cos(tilt), rate, strict=True)
+    return HEAD + "".join(f"{t:.3f},0,{y:.6f},{z:.6f},{x:.6f},0,0\n" for t, y, z, x in rows)
+
+
+@pytest.mark.parametrize(("largest", "said"), [(0.5, "gravity's direction"), (3.0, "rows reach above 100")])
+def test_angular_rates_in_degrees_are_refused(tmp_path: Path, largest: float, said: str) -> None:
+    with pytest.raises(CaptureError, match=rf"{said}.*expected rad/s; this looks like deg/s"):
+        capture.load(folder(tmp_path, turning(180.0 / np.pi, largest)))
+
+
+@pytest.mark.parametrize("largest", [0.0, 0.5, 3.0, 20.0])
+@pytest.mark.parametrize("unit", [1.0, -1.0])
+def test_angular_rates_in_radians_are_taken(tmp_path: Path, largest: float, unit: float) -> None:
+    assert capture.load(folder(tmp_path, turning(unit, largest))).warnings == ()
 
 
 @pytest.mark.parametrize(

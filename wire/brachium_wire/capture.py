@@ -17,6 +17,7 @@ from brachium_body.segments import SEGMENTS, Segment, side_of
 from brachium_wire import table
 from brachium_wire.capture_checks import check_agreement, check_range
 from brachium_wire.capture_settings import CaptureError, CaptureSettings, read_settings, to_toml
+from brachium_wire.capture_units import BOUNDS, check_acc, check_gyr, doubts, rows
 from brachium_wire.samples import MAX_ACC, MAX_GYR, MAX_MAG
 
 Floats = npt.NDArray[np.float64]
@@ -28,7 +29,6 @@ _BLOCKS = {
     "quat": ("qw", "qx", "qy", "qz"),
 }
 _LIMITS = {"acc": MAX_ACC, "gyr": MAX_GYR, "mag": MAX_MAG}
-_BOUNDS = f"above {MAX_ACC:g} m/s^2, {MAX_GYR:g} rad/s or {MAX_MAG:g} uT; is it in these units?"
 _SETTINGS, _TRUTH = "capture.toml", "truth"
 
 
@@ -79,7 +79,7 @@ def load(folder: Path) -> Capture:
     except CaptureError as error:
         raise CaptureError(f"{folder}: {error}") from None
     for name, segment in segments.items():
-        warnings += _doubts(name, segment)
+        warnings += doubts(name, segment.acc, segment.dropped - segment.beyond, segment.beyond)
     return Capture(settings=settings, segments=segments, truth=truth, warnings=tuple(warnings))
 
 
@@ -168,11 +168,16 @@ def _segment(path: Path, nominal_hz: float | None) -> CaptureSegment:
         if (block := blocks[name]) is not None:
             keep &= ~(np.abs(np.nan_to_num(block, posinf=0.0, neginf=0.0)) > limit).any(axis=1)
     beyond = int((whole & ~keep).sum())
+    rates = None if blocks["gyr"] is None else blocks["gyr"][whole]
     t, blocks = t[keep], {name: None if b is None else b[keep] for name, b in blocks.items()}
     if len(t) < 2:
-        out = f"; {beyond} hold what no sensor measures ({_BOUNDS})" if beyond else ""
-        raise CaptureError(f"{path}: {_rows(len(t), 'whole ')}, at least two are needed{out}")
+        out = f"; {beyond} hold what no sensor measures ({BOUNDS})" if beyond else ""
+        raise CaptureError(f"{path}: {rows(len(t), 'whole ')}, at least two are needed{out}")
     _check_order(path, t, np.flatnonzero(keep))
+    acc, gyr = blocks["acc"], blocks["gyr"]
+    if acc is not None and gyr is not None and rates is not None:
+        check_acc(str(path), acc)
+        check_gyr(str(path), t, acc, gyr, rates)
     if (quat := blocks["quat"]) is not None:
         blocks["quat"] = _unit(path, quat)
     if (mag := blocks["mag"]) is not None:
@@ -229,21 +234,3 @@ def _unit(path: Path, quat: Floats) -> Floats:
         raise CaptureError(f"{path}: qw qx qy qz of length {length[worst]:.3f}; a rotation has length 1")
     unit: Floats = quat / length[:, None]
     return unit
-
-
-def _doubts(name: str, segment: CaptureSegment) -> list[str]:
-    """Return what looks like another unit, or like loss."""
-    said = []
-    if segment.acc is not None and not 5.0 < float(np.median(np.linalg.norm(segment.acc, axis=1))) < 20.0:
-        said.append(
-            f"{name}: half of all accelerations are far from 9.8; expected m/s^2 with gravity in them"
-        )
-    if missing := segment.dropped - segment.beyond:
-        said.append(f"{name}: {_rows(missing)} left out, because a number is missing")
-    if segment.beyond:
-        said.append(f"{name}: {_rows(segment.beyond)} left out, because no sensor measures that ({_BOUNDS})")
-    return said
-
-
-def _rows(n: int, kind: str = "") -> str:
-    return f"{n} {kind}row{'' if n == 1 else 's'}"
