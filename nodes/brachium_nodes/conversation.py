@@ -6,10 +6,12 @@ from typing import Literal
 
 from brachium_nodes import node_frames as f
 from brachium_nodes.batch_blocks import MAX_DEVICE_US, Measured, measure
+from brachium_nodes.kept_calibration import Keeping
+from brachium_nodes.node_records import info_of, status_of
 from brachium_nodes.roster import Admission, Refusal
 from brachium_nodes.sample_stream import stamp
 from brachium_wire.codec import Drop, WireError, encode
-from brachium_wire.messages import Info, Message, Status
+from brachium_wire.messages import Message, SensorCalibration, Status
 
 HELLO_WITHIN_NS = 3_000_000_000
 STATUS_NS = 1_000_000_000
@@ -60,6 +62,7 @@ class Conversation:
         self.closed = False
         self.refused: Refusal | None = None  # why this side ended it, if it did
         self._said: f.NodeStatus = f.NodeStatus()
+        self._keeping: Keeping | None = None
         self._asked: dict[int, int] = {}
         self._next_id = 0
         self._ask_ns = self._status_ns = now_ns
@@ -126,30 +129,12 @@ class Conversation:
         """Return how the node fares."""
         assert self.admission is not None
         assert self.hello is not None
-        memory, said = self.admission.memory, self._said
+        memory = self.admission.memory
         elapsed = now_ns - self._counted_ns
         gained = memory.counter.received - self._counted
         rate = gained / (elapsed * 1e-9) if elapsed > STATUS_NS // 2 else None
         self._counted_ns, self._counted = now_ns, memory.counter.received
-        clock = memory.clock
-        return Status(
-            node=self.hello.node,
-            time_ns=now_ns,
-            connected=connected,
-            received=memory.counter.received,
-            lost=memory.counter.lost,
-            out_of_order=memory.counter.out_of_order,
-            late=memory.late,
-            rate_hz=rate,
-            battery_v=said.battery_v,
-            battery_hours=said.battery_hours,
-            rssi_dbm=said.rssi_dbm,
-            node_dropped=said.dropped,
-            clock_offset_ns=clock.offset_ns if clock.known else None,
-            clock_skew_ppm=clock.skew_ppm if clock.known else None,
-            clock_uncertainty_ns=clock.uncertainty_ns(clock.newest_us) if clock.known else None,
-            drops=dict(memory.drops),
-        )
+        return status_of(self.hello.node, now_ns, memory, self._said, rate_hz=rate, connected=connected)
 
     def _greet(self, frame: f.NodeFrame, now_ns: int) -> list[Action]:
         if not isinstance(frame, f.Hello) or self.admission is not None:
@@ -163,19 +148,24 @@ class Conversation:
         self._counted = answer.memory.counter.received
         self._status_ns = now_ns + STATUS_NS
         welcome = f.Welcome(subject=answer.subject, segment=answer.segment, host=self._host, time_ns=now_ns)
-        info = Info(
-            node=frame.node,
-            rate_hz=frame.rate_hz,
-            origin=frame.origin,
-            host=self._host,
-            chip=frame.chip,
-            firmware=frame.firmware,
-            mounting=answer.entry.mounting,
-            calibration=answer.calibration,
-            magnetometer=frame.magnetometer,
-            orientation_only=frame.orientation_only,
-        )
-        return [Publish("info", info), Send(encode(welcome)), self._ask(now_ns)]
+        self._keeping = Keeping(frame.calibration, answer.calibration)
+        info, *keep = self._tell_keeping()
+        return [info, Send(encode(welcome)), self._ask(now_ns), *keep]
+
+    def keep(self, calibration: SensorCalibration) -> list[Action]:
+        """Take that the sensor was calibrated anew: publish it, and have the node keep it."""
+        if self.closed or self._keeping is None:
+            return []
+        self._keeping.calibration = calibration
+        return self._tell_keeping()
+
+    def _tell_keeping(self) -> list[Action]:
+        assert self.admission is not None
+        assert self.hello is not None
+        assert self._keeping is not None
+        info = info_of(self.hello, self._host, self.admission.entry.mounting, self._keeping)
+        frame = self._keeping.frame()
+        return [Publish("info", info), *([] if frame is None else [Send(encode(frame))])]
 
     def _take(self, frame: f.NodeFrame, now_ns: int) -> list[Action]:
         assert self.admission is not None
@@ -187,6 +177,12 @@ class Conversation:
         if isinstance(frame, f.NodeStatus):
             self._said = f.checked_status(frame)
             return []
+        if isinstance(frame, f.Kept):
+            assert self._keeping is not None
+            if self._keeping.keeper != "gateway":
+                return []
+            self._keeping.kept()
+            return self._tell_keeping()
         assert isinstance(frame, f.Bye)
         released = self._release()
         self.admission.memory.counter.end(frame.next_sequence)

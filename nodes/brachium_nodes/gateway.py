@@ -17,7 +17,7 @@ from brachium_nodes.connection import Connection
 from brachium_nodes.conversation import Conversation
 from brachium_nodes.discovery import answer_seekers
 from brachium_nodes.host_claim import HostClaims, checked_host
-from brachium_nodes.known_calibrations import calibrations_in
+from brachium_nodes.known_calibrations import CalibrationNews, KnownCalibrations
 from brachium_nodes.listening import CannotListen, listening_address, why_not
 from brachium_nodes.node_door import listening
 from brachium_nodes.node_frames import MAX_FRAME_BYTES, Hello
@@ -28,7 +28,7 @@ from brachium_wire.bus import DEFAULT_ENDPOINT, Bus
 from brachium_wire.codec import encode
 from brachium_wire.heart import Heart
 from brachium_wire.hosttime import HostClock, tell_host_time
-from brachium_wire.messages import Message, Quaternion, SampleBatch
+from brachium_wire.messages import Info, Message, Quaternion, SampleBatch
 
 log = logging.getLogger(__name__)
 
@@ -53,7 +53,8 @@ class GatewaySettings:
     join_token_sha256: str | None = None
     """A token with which new nodes may knock; they wait until they are assigned."""
     calibrations: Path | None = None
-    """Folder of sensor calibrations, one file a node: for nodes that bring none of their own."""
+    """Folder of sensor calibrations, one file a node: for nodes that bring none of their own. What is found
+    while the gateway runs is kept there too."""
 
 
 def token_sha256(token: str) -> str:
@@ -65,16 +66,18 @@ def run(settings: GatewaySettings, stop: threading.Event) -> None:
     """Serve nodes until `stop` is set. Raises CannotListen, BadKey, ValueError or NoRouter, each one line."""
     address = listening_address(settings.bind)
     checked_host(settings.id)
-    roster = Roster(settings.nodes, settings.join_token_sha256, calibrations_in(settings.calibrations))
+    known = KnownCalibrations(settings.calibrations)
+    roster = Roster(settings.nodes, settings.join_token_sha256, known.of)
     with Bus.open(settings.endpoint, stop=stop) as bus:
-        asyncio.run(Gateway(bus, settings, roster).serve(address, stop))
+        asyncio.run(Gateway(bus, settings, roster, known).serve(address, stop))
 
 
 class Gateway:
     """Joins connections, roster and bus. All of it runs on one event loop."""
 
-    def __init__(self, bus: Bus, settings: GatewaySettings, roster: Roster) -> None:
-        self._bus, self._settings, self._roster = bus, settings, roster
+    def __init__(self, bus: Bus, settings: GatewaySettings, roster: Roster, known: KnownCalibrations) -> None:
+        self._bus, self._settings, self._roster, self._known = bus, settings, roster, known
+        self._calibrated = CalibrationNews(bus, settings.room, known)
         self._clock = HostClock()
         self._claims = HostClaims(bus, settings.room, settings.id)
         self._connections: dict[str, Connection] = {}
@@ -105,6 +108,7 @@ class Gateway:
                     self._tick(loop.time())
                     self._beat()
                     self._give_way()
+                    self._bring_calibrations()
         self._beat(now=True)
         log.info("gateway %s ended", settings.id)
 
@@ -171,6 +175,8 @@ class Gateway:
     def _publish(self, admission: Admission, topic: str, message: Message) -> None:
         room, subject, segment = self._settings.room, admission.subject, admission.segment
         if topic == "info":
+            assert isinstance(message, Info)
+            self._known.told(message)
             self._told[subject, segment] = admission.entry.id
             self._bus.retain(keys.info(room, subject, segment), encode(message))
         elif topic == "status":
@@ -180,6 +186,13 @@ class Gateway:
             self._heart.counts["batches"] += 1
             self._heart.counts["samples"] += len(message.offsets) // 4
             self._bus.put(keys.imu(room, subject, segment), encode(message))
+
+    def _bring_calibrations(self) -> None:
+        """Tell nodes that are there what fusion found of their sensors; others get it when they come."""
+        for node, calibration in self._calibrated.drain().items():
+            connection = self._connections.get(node)
+            if connection is not None:
+                connection.do(connection.conversation.keep(calibration))
 
     def _forget(self, node: str) -> None:
         """Show no info any more at a place that a node was assigned away from."""

@@ -3,9 +3,11 @@
 import asyncio
 from collections.abc import Callable
 
+import msgspec
 from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed, InvalidHandshake, InvalidStatus, InvalidURI
 
+from brachium_nodes.kept_calibration import calibration_of
 from brachium_nodes.node_frames import (
     MAX_FRAME_BYTES,
     Batch,
@@ -13,6 +15,8 @@ from brachium_nodes.node_frames import (
     ClockAnswer,
     ClockAsk,
     Hello,
+    Keep,
+    Kept,
     NodeStatus,
     RefusalCode,
     Refused,
@@ -20,6 +24,7 @@ from brachium_nodes.node_frames import (
     from_gateway,
 )
 from brachium_wire.codec import WireError, encode
+from brachium_wire.messages import SensorCalibration
 
 LEAVE_WITHIN_S = 2.0
 
@@ -37,10 +42,22 @@ class NotWelcome(RuntimeError):
 
 
 class NodeClient:
-    """One connection of one node. `device_us` reads the node's clock."""
+    """One connection of one node.
 
-    def __init__(self, url: str, token: str, hello: Hello, device_us: Callable[[], int]) -> None:
+    `device_us` reads the node's clock; `store` puts a calibration where it survives that the node is switched
+    off.
+    """
+
+    def __init__(
+        self,
+        url: str,
+        token: str,
+        hello: Hello,
+        device_us: Callable[[], int],
+        store: Callable[[SensorCalibration], None] = lambda _: None,
+    ) -> None:
         self._url, self._token, self._hello, self._device_us = url, token, hello, device_us
+        self._store = store
         self._socket: ClientConnection | None = None
         self._reader: asyncio.Task[None] | None = None
         self.refused: Refused | None = None
@@ -137,7 +154,18 @@ class NodeClient:
                 if isinstance(frame, ClockAsk):
                     answer = ClockAnswer(id=frame.id, came_us=came_us, left_us=self._device_us())
                     await socket.send(encode(answer))
+                elif isinstance(frame, Keep):
+                    await self._keep(socket, frame)
                 elif isinstance(frame, Refused):
                     self.refused = frame
         except ConnectionClosed:
             return
+
+    async def _keep(self, socket: ClientConnection, frame: Keep) -> None:
+        try:
+            calibration = calibration_of(frame.calibration)
+        except WireError:
+            return
+        self._store(calibration)
+        self._hello = msgspec.structs.replace(self._hello, calibration=calibration)
+        await socket.send(encode(Kept()))

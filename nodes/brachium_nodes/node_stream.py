@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from brachium_nodes.node_frames import Batch, Hello, NodeStatus
-from brachium_wire.messages import Quaternion
+from brachium_wire.messages import Quaternion, SensorCalibration
 
 LOOK_S = 0.05
 
@@ -39,6 +39,8 @@ class NodeStream:
     """What the node's clock shows at a source time in s; linear."""
     says: Callable[[float], NodeStatus] = lambda _time_s: NodeStatus()
     """What the node says of itself at a source time in s; nothing by default."""
+    store: Callable[[SensorCalibration], None] = lambda _calibration: None
+    """Keeps a calibration for when the node is switched on again; by default it is gone then."""
 
 
 @dataclass(slots=True, kw_only=True)

@@ -39,7 +39,7 @@ class Admission:
     replaces: bool
     """An older connection of the same node is still open."""
     calibration: SensorCalibration
-    """The node's own, or what was fitted before for a node that brings none."""
+    """What holds: the node's own, or what was fitted and has not reached it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,7 +58,7 @@ class Roster:
         self,
         entries: tuple[NodeEntry, ...],
         join_token_sha256: str | None = None,
-        calibration_of: Callable[[str], SensorCalibration] = lambda _: SensorCalibration(),
+        calibration_of: Callable[[str, SensorCalibration], SensorCalibration] = lambda _node, own: own,
     ) -> None:
         self._calibration_of = calibration_of
         self._entries: dict[str, NodeEntry] = {}
@@ -124,9 +124,7 @@ class Roster:
         self._connected[hello.node] = place
         self._waiting.pop(hello.node, None)
         where = self._places.setdefault(place, SegmentMemory())
-        calibration = hello.calibration
-        if calibration == SensorCalibration():
-            calibration = self._calibration_of(hello.node)
+        calibration = self._calibration_of(hello.node, hello.calibration)
         return Admission(entry, entry.subject, entry.segment, memory, where, replaces, calibration)
 
     def subject_of(self, node: str) -> str | None:

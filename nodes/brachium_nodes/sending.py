@@ -130,7 +130,9 @@ class SocketSink:
 
     def __init__(self, url: str, token: str, stream: NodeStream, timeline: Timeline) -> None:
         self._clock_us, self._timeline = stream.clock_us, timeline
-        self._client = NodeClient(url, token, stream.hello, lambda: stream.clock_us(timeline.elapsed_s()))
+        self._client = NodeClient(
+            url, token, stream.hello, lambda: stream.clock_us(timeline.elapsed_s()), stream.store
+        )
         self.host: str | None = None
         """The clock that gives host time, once joined."""
 

@@ -7,7 +7,7 @@ import pytest
 
 from brachium_nodes import node_frames as f
 from brachium_nodes.conversation import Conversation, Publish
-from brachium_nodes.known_calibrations import calibrations_in
+from brachium_nodes.known_calibrations import KnownCalibrations
 from brachium_nodes.roster import NodeEntry, Roster
 from brachium_wire import calibration_file as kept
 from brachium_wire.codec import encode
@@ -20,7 +20,7 @@ OWN = SensorCalibration(mag_offset=(1.0, 2.0, 3.0))
 
 def roster(folder: Path | None) -> Roster:
     entry = NodeEntry(id="n1", token_sha256=TOKEN, subject="p01", segment="forearm_r")
-    return Roster((entry,), None, calibrations_in(folder))
+    return Roster((entry,), None, KnownCalibrations(folder).of)
 
 
 def told(roster: Roster, calibration: SensorCalibration) -> SensorCalibration:

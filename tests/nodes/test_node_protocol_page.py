@@ -11,6 +11,7 @@ import pytest
 
 from brachium_nodes import node_frames as f
 from brachium_nodes.batch_blocks import measure
+from brachium_nodes.kept_calibration import text_of
 from brachium_wire.codec import Drop, encode
 from brachium_wire.messages import SensorCalibration
 
@@ -49,6 +50,8 @@ EXAMPLES = {
     "ask": f.ClockAsk(id=42),
     "answer": f.ClockAnswer(id=42, came_us=1300000, left_us=1300180),
     "status": f.NodeStatus(battery_v=3.875, rssi_dbm=-55.0, dropped=0),
+    "keep": f.Keep(calibration=text_of(SensorCalibration(gyro_bias=(0.01, -0.02, 0.0)))),
+    "kept": f.Kept(),
     "bye": f.Bye(next_sequence=10),
     "refused": f.Refused(
         code="segment_taken", reason="forearm_r of p01 is held by node esp-77aa", retry_s=5.0
@@ -74,13 +77,14 @@ def test_the_page_shows_what_is_sent() -> None:
 @pytest.mark.parametrize("name", EXAMPLES)
 def test_the_page_s_bytes_are_understood(name: str) -> None:
     payload = blocks(PAGE.read_text("utf-8"))[name]
-    read = f.from_gateway if name in ("welcome", "ask", "refused") else f.from_node
+    read = f.from_gateway if name in ("welcome", "ask", "keep", "refused") else f.from_node
     assert read(payload) == EXAMPLES[name]
 
 
 def test_the_page_names_every_field_code_and_drop() -> None:
     page = PAGE.read_text("utf-8")
-    for frame in (f.Hello, f.Batch, f.ClockAnswer, f.NodeStatus, f.Bye, f.Welcome, f.ClockAsk, f.Refused):
+    said = (f.Hello, f.Batch, f.ClockAnswer, f.NodeStatus, f.Bye, f.Welcome, f.ClockAsk, f.Keep, f.Refused)
+    for frame in said:
         for name in frame.__struct_encode_fields__:
             assert f"`{name}`" in page, f"{frame.__struct_config__.tag} {name}"
     for code, number in f.CLOSE_CODES.items():
