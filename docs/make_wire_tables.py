@@ -81,6 +81,7 @@ EXAMPLES: tuple[Message, ...] = (
         angles={"shoulder_flexion": 0.125, "elbow_flexion": 1.5},
         assumed={"elbow_flexion": "assumed"},
         received_ns=TIME_NS + 13_000_000,
+        angle_sd={"elbow_flexion": 0.0625},
     ),
     messages.Calibration(
         time_ns=TIME_NS,

@@ -163,6 +163,8 @@ class Skeleton(Message, frozen=True, kw_only=True, tag="skeleton/1"):
     """Its standard deviation along each axis, m, as the estimator states it."""
     received_ns: int | None = msgspec.field(name="rx", default=None)
     """Host time at which the gateway had the last sample that this skeleton needed."""
+    angle_sd: dict[str, float] = msgspec.field(name="angsd", default_factory=dict)
+    """Standard deviations of angles, rad: tilt and heading between sensors, not mounting nor soft tissue."""
 
 
 class Calibration(Message, frozen=True, kw_only=True, tag="calibration/1"):
