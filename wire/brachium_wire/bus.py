@@ -20,6 +20,7 @@ import zenoh
 
 from brachium_wire import keys
 from brachium_wire.codec import encode
+from brachium_wire.heard_keys import HeardKeys
 from brachium_wire.messages import Answer
 from brachium_wire.topics import TOPICS, Urgency
 
@@ -28,14 +29,16 @@ log = logging.getLogger(__name__)
 DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
 LEASE_MS = 4000
 """A host that vanished is noticed after this; TCP hides shorter Wi-Fi outages."""
+ROOM_USER = "room"
+"""The user all programs of a room attach as, where the room has a password."""
+PASSWORD_VARIABLE = "BRACHIUM_PASSWORD"
+"""Environment variable with the room's password: a command line would show it to every user."""
 
 _PRIORITY = {
     Urgency.DATA: zenoh.Priority.DATA,
     Urgency.CONTROL: zenoh.Priority.INTERACTIVE_HIGH,
     Urgency.BACKGROUND: zenoh.Priority.BACKGROUND,
 }
-
-
 _ENDPOINT = re.compile(r"(tcp|tls|quic|udp|ws)/[^\s/?#]+:[0-9]{1,5}([?#]\S*)?|unixsock-stream/\S+")
 
 
@@ -45,12 +48,6 @@ class NoRouter(RuntimeError):
 
 class BadEndpoint(NoRouter, ValueError):
     """Nothing can be an endpoint that is written so."""
-
-
-ROOM_USER = "room"
-"""The user all programs of a room attach as, where the room has a password."""
-PASSWORD_VARIABLE = "BRACHIUM_PASSWORD"
-"""Environment variable with the room's password: a command line would show it to every user."""
 
 
 def client_config(endpoint: str, password: str | None = None) -> zenoh.Config:
@@ -84,9 +81,8 @@ class Inbox:
 
     def __init__(self, capacity: int) -> None:
         self._queue: deque[tuple[str, bytes]] = deque(maxlen=capacity)
-        self._lock = (
-            threading.Lock()
-        )  # held for an append or a copy: the counts are exact, no arrival is missed
+        # Held for an append or a copy: the counts are exact, no arrival is missed.
+        self._lock = threading.Lock()
         self._arrived = threading.Event()
         self._wake: Callable[[], None] | None = None
         self.received = 0
@@ -121,8 +117,10 @@ class Inbox:
             self.received += 1
             self.dropped += len(self._queue) == self._queue.maxlen
             self._queue.append((key, payload))
-            wake = None if self._arrived.is_set() else self._wake
+            if self._arrived.is_set():
+                return
             self._arrived.set()
+            wake = self._wake
         if wake is not None:
             wake()
 
@@ -137,6 +135,7 @@ class Bus:
 
     def __init__(self, session: zenoh.Session, endpoint: str) -> None:
         self._session = session
+        self._heard_keys = HeardKeys(self._declare_key)
         self.endpoint = endpoint
         self._lock = threading.Lock()
         self._declaring = threading.Lock()
@@ -260,10 +259,18 @@ class Bus:
 
         def heard(sample: zenoh.Sample) -> None:
             if sample.kind == zenoh.SampleKind.PUT:
-                inbox.put(str(sample.key_expr), sample.payload.to_bytes())
+                key = str(sample.key_expr)
+                self._heard_keys.see(key)
+                inbox.put(key, sample.payload.to_bytes())
 
         self._keep(self._session.declare_subscriber(keys.expression(key_expression), heard))
         return inbox
+
+    def _declare_key(self, key: str) -> object:
+        try:
+            return self._session.declare_keyexpr(key)
+        except zenoh.ZError:  # closed meanwhile
+            return None
 
     def serve(self, key_expression: str, answer: Callable[[str, bytes], bytes]) -> None:
         """Answer queries on matching keys with the bytes of `answer(key, question)`, run on Zenoh's thread.
@@ -300,7 +307,8 @@ class Bus:
                 asked(key, b"" if question is None else question.to_bytes(), reply)
             except Exception as error:
                 log.exception("answering %r", key[:80])
-                reason = f"failed inside: {_line(error)}; see the service's log"
+                line = " ".join(str(error).split())[:200] or type(error).__name__
+                reason = f"failed inside: {line}; see the service's log"
                 reply(encode(Answer(ok=False, reason=reason)))
 
         self._keep(self._session.declare_queryable(keys.expression(key_expression), heard))
@@ -341,11 +349,8 @@ class Bus:
         def heard(sample: zenoh.Sample) -> None:
             changed(str(sample.key_expr), sample.kind == zenoh.SampleKind.PUT)
 
-        self._keep(
-            self._session.liveliness().declare_subscriber(
-                keys.expression(key_expression), heard, history=True
-            )
-        )
+        tokens = keys.expression(key_expression)
+        self._keep(self._session.liveliness().declare_subscriber(tokens, heard, history=True))
 
     def close(self) -> None:
         """Leave the bus: tokens vanish, retained values are no longer answered. Closing twice is harmless.
@@ -373,7 +378,3 @@ def _to_do(password: str | None) -> str:
     if password:
         return f"{start}; or the room's password is wrong (${PASSWORD_VARIABLE})"
     return f"{start}; or, where the room has a password, set ${PASSWORD_VARIABLE}"
-
-
-def _line(error: Exception) -> str:
-    return " ".join(str(error).split())[:200] or type(error).__name__
