@@ -6,7 +6,6 @@ from struct import unpack
 
 import numpy as np
 
-from brachium_nodes.clock import Integers
 from brachium_nodes.node_frames import MAX_FRAME_SAMPLES, MAX_SPAN_US, Batch, Hello
 from brachium_wire.codec import Drop, WireError
 from brachium_wire.messages import SampleBatch, Vector
@@ -22,7 +21,8 @@ class Measured:
     """A checked batch. `batch` has every field but host times, which only the clock can give."""
 
     batch: SampleBatch
-    device_us: Integers
+    device_us: list[int]
+    """The node's clock at each sample."""
 
     def __len__(self) -> int:
         return len(self.device_us)
@@ -59,11 +59,12 @@ def measure(frame: Batch, hello: Hello) -> Measured:
     )
     if not _plainly_sound(batch, n):
         read_samples(batch)  # the one check of shapes, finiteness and ranges; it says what is wrong
-    return Measured(batch, np.array(offsets, dtype=np.int64) + frame.device_us)
+    first_us = frame.device_us
+    return Measured(batch, [first_us + offset for offset in offsets])
 
 
 def _plainly_sound(batch: SampleBatch, n: int) -> bool:
-    """Return whether nothing can be wrong with the blocks, as with nearly all batches, at a tenth of the time."""
+    """Return whether nothing can be wrong with the blocks, as with nearly all batches: a quick look."""
     acc, gyr, mag, index = batch.acc, batch.gyr, batch.mag, batch.mag_index
     if acc is None or gyr is None or batch.quat is not None or not len(acc) == len(gyr) == 12 * n:
         return False
@@ -77,8 +78,9 @@ def _plainly_sound(batch: SampleBatch, n: int) -> bool:
         which = unpack(f"<{len(index) // 2}H", index) if len(index) % 2 == 0 else ()
         if not which or len(mag) != 12 * len(which) or which[-1] >= n or not all(map(lt, which, which[1:])):
             return False
-    numbers = np.frombuffer(b"".join((acc, gyr, mag or b"")), dtype="<f4")
-    return bool(np.maximum.reduce(np.abs(numbers)) <= MAX_GYR)  # the smallest limit; NaN compares false
+    blocks = b"".join((acc, gyr, mag or b""))
+    numbers = map(abs, unpack(f"<{len(blocks) // 4}f", blocks))
+    return all(map(MAX_GYR.__ge__, numbers))  # the smallest limit; NaN compares false
 
 
 def _si(block: bytes | None, scale: Vector | None, big_endian: bool) -> bytes | None:

@@ -98,12 +98,16 @@ class NodeClock:
 
     def host_times(self, device_us: list[int]) -> list[int]:
         """Return the same of a few: lists are quicker then."""
-        intercept, slope, origin_us, origin_ns = (
-            self._intercept, self._slope, self._origin_us, self._origin_ns,
-        )  # fmt: skip
-        if device_us and min(device_us) >= self._correction_us + self._correction_span_us:
-            return [us * 1000 + origin_ns + round(intercept + slope * (us - origin_us)) for us in device_us]
-        return [us * 1000 + origin_ns + round(self._exact_ns(us)) for us in device_us]
+        origin_us, origin_ns, since_us = self._origin_us, self._origin_ns, self._correction_us
+        offset, slope = self._intercept, self._slope
+        first_us, last_us = min(device_us), max(device_us)
+        if since_us <= first_us and last_us <= since_us + self._correction_span_us:
+            fading = self._correction_ns / self._correction_span_us
+            offset += self._correction_ns + fading * (since_us - origin_us)
+            slope -= fading
+        elif first_us < since_us + self._correction_span_us:
+            return [us * 1000 + origin_ns + round(self._exact_ns(us)) for us in device_us]
+        return [us * 1000 + origin_ns + round(offset + slope * (us - origin_us)) for us in device_us]
 
     def publish(self, device_us: int) -> None:
         """Take that host times up to this device time are given away: later estimates join on to them."""

@@ -44,16 +44,16 @@ def stamp(measured: Measured, memory: Memory, place: SegmentMemory, received_ns:
 
     Raises WireError for times that cannot be: then nothing is counted.
     """
-    device_us: list[int] = measured.device_us.tolist()
-    batch, clock, newest_us = measured.batch, memory.clock, device_us[-1]
+    batch, clock, device_us = measured.batch, memory.clock, measured.device_us
+    newest_us = device_us[-1]
     expected = memory.counter.next
     in_order = not batch.late and (expected is None or batch.sequence >= expected)
     if in_order and device_us[0] <= memory.newest_us:
         raise WireError(Drop.TIME_BACKWARDS, f"batch/1: t {batch.device_us} is not after the sample before")
     if not clock.known:
         clock.arrival(newest_us, received_ns)
-    times = clock.host_times(device_us)
-    if times[0] <= 0 or times[-1] > received_ns + clock.uncertainty_ns(newest_us) + MAX_AHEAD_NS:
+    times, uncertainty_ns = clock.host_times(device_us), clock.uncertainty_ns(newest_us)
+    if times[0] <= 0 or times[-1] > received_ns + uncertainty_ns + MAX_AHEAD_NS:
         raise WireError(Drop.OUT_OF_RANGE, f"batch/1: t {batch.device_us} lies in the future")
     if in_order:
         clock.publish(newest_us)
@@ -74,7 +74,7 @@ def stamp(measured: Measured, memory: Memory, place: SegmentMemory, received_ns:
         time_ns=times[0],
         offsets=pack(f"<{len(times)}I", *[t - times[0] for t in times]),
         received_ns=received_ns,
-        uncertainty_ns=clock.uncertainty_ns(newest_us),
+        uncertainty_ns=uncertainty_ns,
     )
 
 

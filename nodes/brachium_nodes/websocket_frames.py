@@ -6,6 +6,8 @@ A gateway reads thousands of small frames a second; this does no more for each t
 from struct import pack, unpack_from
 from typing import NamedTuple
 
+from websockets.frames import apply_mask as masked
+
 TEXT, BINARY, CLOSE, PING, PONG = 1, 2, 8, 9, 10
 PROTOCOL_ERROR, BAD_TEXT, TOO_BIG = 1002, 1007, 1009
 MAX_CONTROL = 125
@@ -111,13 +113,6 @@ def _checked(kind: int, payload: bytes) -> bytes:
         except UnicodeDecodeError:
             raise Broken(BAD_TEXT, "text is UTF-8") from None
     return payload
-
-
-def masked(payload: bytes, key: bytes) -> bytes:
-    """Return `payload` masked, or unmasked, with a key of 4 bytes."""
-    size = len(payload)
-    keys = (key * (size // 4 + 1))[:size]
-    return (int.from_bytes(payload, "little") ^ int.from_bytes(keys, "little")).to_bytes(size, "little")
 
 
 def frame(kind: int, payload: bytes) -> bytes:

@@ -1,6 +1,7 @@
 """One sensor on the bus: its frames in, batches for its segment out. Pure: bytes and times are arguments."""
 
 from collections import Counter
+from struct import pack
 from typing import Any
 
 import numpy as np
@@ -156,14 +157,14 @@ class CanImu:
         waiting, self._waiting = self._waiting, []
         if not waiting:
             return []
-        device_us = np.array([us for _, us, _ in waiting], dtype=np.int64)
-        offsets = (device_us - device_us[0]).astype("<u4").tobytes()
+        device_us = [us for _, us, _ in waiting]
+        offsets = pack(f"<{len(waiting)}I", *(us - device_us[0] for us in device_us))
         blocks, rows = self._blocks([sample for _, _, sample in waiting])
         batch = SampleBatch(
             sequence=waiting[0][0],
             time_ns=1,
             offsets=offsets,
-            device_us=int(device_us[0]),
+            device_us=device_us[0],
             device_offsets=offsets,
             received_ns=1,
             uncertainty_ns=0,
@@ -175,7 +176,9 @@ class CanImu:
         )
         try:
             read_samples(batch)  # the one check of shapes, finiteness and ranges
-            made = stamp(Measured(batch, device_us), self._memory, self._place, waiting[-1][2].arrived_ns)
+            made = stamp(
+                Measured(batch, device_us.tolist()), self._memory, self._place, waiting[-1][2].arrived_ns
+            )
         except WireError as error:
             self.drops[error.drop.value] += len(waiting)
             return []
