@@ -30,8 +30,7 @@ from brachium_wire.hosttime import HostClock
 from brachium_wire.messages import Info, SampleBatch
 
 ROOM, SUBJECT = "firmware", "p01"
-WORN: dict[Segment, float] = {"forearm_r": 100.0, "upper_arm_r": 50.0}
-"""Segments and their rates in Hz."""
+WORN: tuple[Segment, ...] = ("upper_arm_r", "forearm_r")
 WORD = 2048
 """Bytes of this host's memory for objects that stand for 1 K on the chip."""
 JOIN_S = 20.0
@@ -43,6 +42,7 @@ class FirmwareFigures:
     """What a run has shown, by segment."""
 
     seconds: float
+    rate_hz: float
     events: list[str]
     """What was done to the network, in order."""
     samples: dict[str, SampleFigures]
@@ -62,6 +62,7 @@ class FirmwareRun:
 
     folder: Path
     seconds: float
+    rate_hz: float
     faults: bool
     processes: Processes
     router_port: int = field(default_factory=free_port)
@@ -124,7 +125,7 @@ class FirmwareRun:
         until(1.0)
 
     def _prepare(self, segment: Segment) -> Path:
-        folder, rate_hz = self.folder / segment, WORN[segment]
+        folder, rate_hz = self.folder / segment, self.rate_hz
         settings = WearerSettings(rate_hz=rate_hz, mag_every=1, segments=(segment,), seed=3)
         prepare(
             folder,
@@ -174,8 +175,8 @@ class FirmwareRun:
 
     def _figures(self, heard: "_Heard", reports: dict[Segment, Counts], refused: int) -> FirmwareFigures:
         samples: dict[str, SampleFigures] = {}
-        for segment, rate_hz in WORN.items():
-            wearer = Wearer(WearerSettings(rate_hz=rate_hz, mag_every=1, segments=(segment,), seed=3))
+        for segment in WORN:
+            wearer = Wearer(WearerSettings(rate_hz=self.rate_hz, mag_every=1, segments=(segment,), seed=3))
             samples[segment] = sample_figures(
                 heard.batches[segment],
                 heard.joined_ns[segment],
@@ -184,6 +185,7 @@ class FirmwareRun:
             )
         return FirmwareFigures(
             seconds=self.seconds,
+            rate_hz=self.rate_hz,
             events=self.events,
             samples=samples,
             boards={str(segment): report for segment, report in reports.items()},

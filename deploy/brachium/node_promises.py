@@ -12,10 +12,11 @@ def _worst(name: str) -> Take:
     return take
 
 
-def _firmware(run: str) -> Proof:
+def _firmware(run: str, rate_hz: int) -> Proof:
+    words = ("--run", run, "--rate", str(rate_hz), "--seconds", "60")
     return Proof(
-        name=f"firmware-{run}",
-        commands=(("firmware", "--run", run, "--seconds", "60", "--json"),),
+        name=f"firmware-{run}-{rate_hz}",
+        commands=(("firmware", *words, "--json"),),
         promises=(
             Promise(name="unexplained", unit="samples", take=_worst("unexplained"), at_most=0),
             Promise(name="sent again, not marked late", unit="samples", take=_worst("unmarked"), at_most=0),
@@ -29,7 +30,25 @@ def _firmware(run: str) -> Proof:
     )
 
 
+def _battery() -> Proof:
+    ahead = ("warned_min",)
+    return Proof(
+        name="firmware-battery",
+        commands=(("firmware", "--discharge", "--json"),),
+        promises=(
+            figure("cells that end with no warning", "1", "never_warned", at_most=0),
+            figure("warned less than 20 min ahead", "1", "later_than_20_min", at_most=0),
+            figure("warned more than 35 min ahead", "1", "earlier_than_35_min", at_most=0),
+            figure("cells", "1", "cells"),
+            *(
+                figure(f"warned ahead, {which}", "min", *ahead, which)
+                for which in ("least", "median", "most")
+            ),
+        ),
+    )
+
+
 NODE_PROOFS: tuple[Proof, ...] = (
-    _firmware("quiet"),
-    _firmware("faults"),
+    *(_firmware(run, rate_hz) for run in ("quiet", "faults") for rate_hz in (50, 100)),
+    _battery(),
 )

@@ -13,6 +13,7 @@ from pathlib import Path
 from websockets.http11 import Request
 
 from brachium_nodes.assign_command import serve_assign
+from brachium_nodes.battery_watch import BatteryWatch
 from brachium_nodes.connection import Connection
 from brachium_nodes.conversation import Conversation
 from brachium_nodes.discovery import answer_seekers
@@ -28,7 +29,7 @@ from brachium_wire.bus import DEFAULT_ENDPOINT, Bus
 from brachium_wire.codec import encode
 from brachium_wire.heart import Heart
 from brachium_wire.hosttime import HostClock, tell_host_time
-from brachium_wire.messages import Info, Message, Quaternion, SampleBatch
+from brachium_wire.messages import Info, Message, Quaternion, SampleBatch, Status
 
 log = logging.getLogger(__name__)
 
@@ -83,6 +84,7 @@ class Gateway:
         self._connections: dict[str, Connection] = {}
         self._tokens: dict[str, Callable[[], None]] = {}
         self._open: set[Connection] = set()
+        self._batteries = BatteryWatch()
         self._told: dict[tuple[str, str], str] = {}  # whose info a place shows, connected or not
 
     async def serve(self, address: str, stop: threading.Event) -> None:
@@ -180,6 +182,8 @@ class Gateway:
             self._told[subject, segment] = admission.entry.id
             self._bus.retain(keys.info(room, subject, segment), encode(message))
         elif topic == "status":
+            assert isinstance(message, Status)
+            self._batteries.look(message)
             self._bus.put(keys.status(room, subject, segment), encode(message))
         else:
             assert isinstance(message, SampleBatch)

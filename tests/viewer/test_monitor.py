@@ -58,7 +58,16 @@ def test_it_shows_who_was_there_before_and_who_comes(bus: Bus) -> None:
     out = Stopper(stop, '"battery_v": 3.5')
     key = keys.status(ROOM, "p01", "hand_r")
     status = encode(
-        Status(node="n7", time_ns=1, connected=True, received=9, lost=1, out_of_order=0, battery_v=3.5)
+        Status(
+            node="n7",
+            time_ns=1,
+            connected=True,
+            received=9,
+            lost=1,
+            out_of_order=0,
+            battery_v=3.5,
+            battery_hours=0.3,
+        )
     )
 
     def send() -> None:
@@ -94,3 +103,16 @@ def test_what_a_node_sent_in_vain_stands_beside_it() -> None:
     )
     network.feed(keys.status(ROOM, "p01", "hand_r"), encode(status), 1)
     assert "  p01/hand_r dropped 3 malformed\n" in monitor.block(network.report(2))
+
+
+@pytest.mark.parametrize(("hours", "warned"), [(0.5, False), (1 / 3, True), (0.0, True), (None, False)])
+def test_a_low_battery_is_named(hours: float | None, warned: bool) -> None:
+    network = Network()
+    status = Status(
+        node="n7", time_ns=1, connected=True, received=9, lost=0, out_of_order=0, battery_hours=hours
+    )
+    network.feed(keys.status(ROOM, "p01", "hand_r"), encode(status), 1)
+    said = monitor.block(network.report(2))
+    assert ("LOW BATTERY: p01/hand_r" in said) is warned
+    if hours == 1 / 3:
+        assert "20 min left\n" in said

@@ -9,6 +9,7 @@ from typing import TextIO
 
 from brachium_viewer.health import ArmHealth, Network, NetworkHealth, NodeHealth
 from brachium_wire import keys
+from brachium_wire.battery import is_low
 from brachium_wire.bus import DEFAULT_ENDPOINT, Bus
 from brachium_wire.heart import Heart
 from brachium_wire.hosttime import HostClock
@@ -88,6 +89,13 @@ def block(health: NetworkHealth, *, colour: bool = False) -> str:
             ]
     lines += [
         f"  {n.subject}/{n.segment} dropped {_counts(n.drops)}" for n in health.nodes if any(n.drops.values())
+    ]
+    lines += [
+        _paint(
+            f"LOW BATTERY: {n.subject}/{n.segment}: {60 * n.battery_hours:.0f} min left", "missing", colour
+        )
+        for n in health.nodes
+        if n.battery_hours is not None and is_low(n.battery_hours)
     ]
     if health.services:
         up = [f"{s.kind}/{s.id}" for s in health.services if s.up]

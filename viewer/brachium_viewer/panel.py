@@ -3,6 +3,7 @@
 import re
 from collections.abc import Mapping
 
+from brachium_wire.battery import is_low
 from brachium_wire.messages import Calibration, Forward, Origin, Skeleton, Status
 
 NOT_A_DEVICE = "Brachium is a measuring and research tool, not a medical device."
@@ -82,6 +83,13 @@ def _calibration(calibration: Calibration | None) -> str:
     return text + (f": {plain(calibration.reason)}" if calibration.reason else "")
 
 
+def _battery(status: Status) -> str:
+    volts = "–" if status.battery_v is None else f"{status.battery_v:.2f} V"
+    if status.battery_hours is None or not is_low(status.battery_hours):
+        return volts
+    return f"**low: {60 * status.battery_hours:.0f} min left**"
+
+
 def _sensor(segment: str, status: Status) -> str:
     name = plain(segment.replace("_", " "))
     asked = status.received + status.lost
@@ -90,7 +98,7 @@ def _sensor(segment: str, status: Status) -> str:
         name if status.connected else f"**{name}: gone**",
         "–" if status.rate_hz is None else f"{status.rate_hz:.0f}",
         lost,
-        "–" if status.battery_v is None else f"{status.battery_v:.2f} V",
+        _battery(status),
         "–" if status.rssi_dbm is None else f"{status.rssi_dbm:.0f} dBm",
     )
     return "| " + " | ".join(cells) + " |"

@@ -1,24 +1,33 @@
-"""Compile the wearables' firmware into the files that are flashed, or run it here against a network.
+"""Compile the wearables' firmware into the files that are flashed, configure a node, or run it all here.
 
 brachium firmware --out flash
-  brachium firmware --run faults --seconds 60
+  brachium firmware --configure brachium.json --serial /dev/ttyUSB0
+  brachium firmware --run faults --rate 100 --seconds 60
+  brachium firmware --runtime
 """
 
 import argparse
 import sys
 from pathlib import Path
+from statistics import median
 from tempfile import TemporaryDirectory
 
 from brachium.option_types import duration_s
-from brachium.shell import Usage, add_json, print_json, stop_on_signals
+from brachium.shell import add_json, print_json, stop_on_signals
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
     """Add the options."""
-    parser.add_argument("--out", type=Path, metavar="DIR", help="write the files for the chip here")
-    parser.add_argument(
+    what = parser.add_mutually_exclusive_group(required=True)
+    what.add_argument("--out", type=Path, metavar="DIR", help="write the files for the chip here")
+    what.add_argument(
         "--run", choices=["quiet", "faults"], help="run it on this host, and count every sample"
     )
+    what.add_argument("--runtime", action="store_true", help="how long a node runs on its cell")
+    what.add_argument(
+        "--discharge", action="store_true", help="empty emulated cells: does the warning come in time?"
+    )
+    parser.add_argument("--rate", type=int, choices=[50, 100], default=50, help="samples a second of --run")
     parser.add_argument("--seconds", type=duration_s, default=60.0, help="how long to run")
     parser.add_argument("--folder", type=Path, metavar="DIR", help="keep the run's logs here")
     add_json(parser)
@@ -26,14 +35,14 @@ def configure(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Compile, or run."""
-    if (args.out is None) == (args.run is None):
-        raise Usage("give --out DIR for the files to flash, or --run quiet or faults")
     if args.out is not None:
         from brachium_nodes.firmware_build import flash_files
 
         for path in flash_files(args.out):
             print(path)
         return 0
+    if args.runtime:
+        return _run_times(args)
     if args.folder is not None:
         return _measure(args, args.folder)
     with TemporaryDirectory() as folder:
@@ -41,12 +50,63 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _measure(args: argparse.Namespace, folder: Path) -> int:
+    return _discharge(args, folder) if args.discharge else _run(args, folder)
+
+
+def _run_times(args: argparse.Namespace) -> int:
+    from brachium_nodes.run_time import run_times
+
+    found = run_times()
+    if args.json:
+        print_json({"run_times": found})
+        return 0
+    for one in found:
+        print(
+            f"{one.parts}, {one.rate_hz:g} Hz: {one.total_ma:.0f} mA "
+            f"(listening {one.listening_ma:g}, sending {one.sending_ma:g}, computing {one.computing_ma:g}, "
+            f"sensor {one.sensor_ma:g}, board {one.board_ma:g}, reserve {one.reserve_ma:g}); "
+            f"{one.hours:.1f} h on {one.capacity_mah:g} mAh"
+        )
+    for source in dict.fromkeys(one.source for one in found):
+        print(f"from the {source}")
+    return 0
+
+
+def _discharge(args: argparse.Namespace, folder: Path) -> int:
+    from brachium_nodes.discharge import cells, discharge
+    from brachium_nodes.firmware_build import build
+
+    found = discharge(folder, build(folder / "build"), cells())
+    ahead = [one.warned_min for one in found if one.warned_min is not None]
+    figures = {
+        "cells": len(found),
+        "never_warned": len(found) - len(ahead),
+        "warned_min": {"least": min(ahead), "median": median(ahead), "most": max(ahead)},
+        "later_than_20_min": sum(minutes < 20.0 for minutes in ahead),
+        "earlier_than_35_min": sum(minutes > 35.0 for minutes in ahead),
+        "discharges": found,
+    }
+    if args.json:
+        print_json(figures)
+        return 0
+    print(
+        f"{len(found)} cells: warned {min(ahead):.1f} to {max(ahead):.1f} min before the end, "
+        f"median {median(ahead):.1f}; never warned: {len(found) - len(ahead)}"
+    )
+    return 0
+
+
+def _run(args: argparse.Namespace, folder: Path) -> int:
     from brachium.firmware_run import FirmwareRun
     from brachium.processes import Processes
 
     with Processes() as processes:
         run = FirmwareRun(
-            folder=folder, seconds=args.seconds, faults=args.run == "faults", processes=processes
+            folder=folder,
+            seconds=args.seconds,
+            rate_hz=args.rate,
+            faults=args.run == "faults",
+            processes=processes,
         )
         figures = run.run(stop_on_signals())
     if args.json:
@@ -58,5 +118,8 @@ def _measure(args: argparse.Namespace, folder: Path) -> int:
             f"{segment}: {found.taken} taken, {found.received} received, {found.lost} lost, "
             f"{found.late} late, {found.unexplained} unexplained, rate off by {found.rate_off_percent:.3f} %"
         )
-    print(f"memory: {figures.heap_peak_k:.1f} of 36 K at most; {figures.skeletons} skeletons")
+    print(
+        f"memory: {figures.heap_peak_k:.1f} of 36 K at most, beside {figures.heap_shim_k:.1f} K for the "
+        f"chip's own modules; {figures.skeletons} skeletons"
+    )
     return 0
