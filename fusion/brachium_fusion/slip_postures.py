@@ -54,11 +54,14 @@ def turned_since(ups: Floats) -> Turned | None:
     misfits = (angles / SAME) ** 2
     for split in range(max(2, len(ups) - SPLITS), len(ups)):
         between = misfits[:split, split:]
-        as_known = np.minimum(between.sum(axis=2).min(axis=0), STRANGE)
+        together = between.sum(axis=2)
+        as_known = np.minimum(together.min(axis=0), STRANGE)
         if as_known[0] < ALIKE:
             continue  # the first rest after a slip looks strange
+        if best is not None and as_known.sum() <= best.evidence:
+            continue  # no turn explains more than all of it
         for sensor in range(ups.shape[1]):
-            others = between.sum(axis=2) - between[:, :, sensor]
+            others = together - between[:, :, sensor]
             others = np.where(angles[:split, split:, sensor] < NEAR, others, np.inf)
             if others[:, 0].min() > STRANGE:
                 continue
@@ -93,26 +96,33 @@ def _explained(before: Floats, after: Floats, others: Floats) -> tuple[Floats, F
 
     `others` (m, n) is how badly the other sensors match. Nearest postures and turn are found in turns.
     """
-    turn = np.zeros(3)
+    turn, rows = np.zeros(3), np.arange(len(after))
+    own = _apart(before, after)
     for round_ in range(ROUNDS):
-        turned = rotation.rotate(rotation.from_rotation_vector(turn), after)
-        own = (np.arccos(np.clip(before @ turned.T, -1.0, 1.0)) / SAME) ** 2
         # At first the sensor's own angle hardly counts: it is what is looked for.
         both = others + (0.01 * own if round_ == 0 else own)
         nearest = both.argmin(axis=0)
-        rows = np.arange(len(after))
         matched = np.flatnonzero(others[nearest, rows] < ALIKE)
         if not len(matched):
             return None
         turn = _fit(before[nearest[matched]], after[matched])
-    turned = rotation.rotate(rotation.from_rotation_vector(turn), after)
-    own = (np.arccos(np.clip(before @ turned.T, -1.0, 1.0)) / SAME) ** 2
+        turned = after @ rotation.to_matrix(rotation.from_rotation_vector(turn)).T
+        own = _apart(before, turned)
     return turn, np.minimum((others + own).min(axis=0), STRANGE)
+
+
+def _apart(before: Floats, after: Floats) -> Floats:
+    """Return the misfits (m, n) of one sensor between rests."""
+    together = before @ after.T
+    angles: Floats = np.arccos(np.minimum(np.maximum(together, -1.0, out=together), 1.0, out=together))
+    misfits: Floats = (angles / SAME) ** 2
+    return misfits
 
 
 def _fit(before: Floats, after: Floats) -> Floats:
     """Return the rotation vector (3,) with least squares of before = after + turn x after, shrunk to none."""
     # |turn x v - d|^2 over all rows: the sum of (1 - v v') turn = the sum of v x d.
     normal = len(after) * np.eye(3) - after.T @ after + (SAME / SLIP) ** 2 * np.eye(3)
-    turn: Floats = np.linalg.solve(normal, np.cross(after, before - after).sum(axis=0))
+    m = after.T @ (before - after)
+    turn: Floats = np.linalg.solve(normal, [m[1, 2] - m[2, 1], m[2, 0] - m[0, 2], m[0, 1] - m[1, 0]])
     return turn
