@@ -4,6 +4,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from itertools import pairwise
 from pathlib import Path
 
 import can
@@ -13,11 +14,12 @@ from cantools import database
 
 from brachium_nodes.can import service
 from brachium_nodes.can.map_files import SHIPPED
-from brachium_nodes.can.port import PortSettings
+from brachium_nodes.can.port import NoInterface, Port, PortSettings
 from brachium_wire import keys
 from brachium_wire.bus import Bus
-from brachium_wire.codec import decode
-from brachium_wire.messages import Health, Info, SampleBatch, Status
+from brachium_wire.codec import decode, encode
+from brachium_wire.hosttime import HostClock, tell_host_time
+from brachium_wire.messages import Health, Info, Origin, SampleBatch, SegmentPose, Skeleton, Status
 from brachium_wire.samples import read_samples
 
 pytestmark = pytest.mark.network
@@ -49,11 +51,11 @@ add_to_ids = 2
 """
 
 
-def until(found: Callable[[], bool]) -> None:
-    deadline = time.monotonic() + WITHIN_S
+def until(found: Callable[[], object]) -> None:
+    deadline, pause = time.monotonic() + WITHIN_S, threading.Event()
     while not found():
         assert time.monotonic() < deadline
-        time.sleep(0.01)
+        pause.wait(0.01)
 
 
 @contextmanager
@@ -162,3 +164,134 @@ def test_sensors_of_two_makers_come_in_beside_a_babbling_node(endpoint: str, tmp
     assert decode(by_topic["status", "forearm_r"][-1], Status).lost == 0  # its time wrapped meanwhile
     health = decode(by_topic["health", "can/can"][-1], Health)
     assert health.drops["unknown_id"] == 40
+
+
+JOINTS = 'subject = "p01"\nside = "right"\n'
+
+
+def arm(tick: int, time_ns: int, origin: Origin = "worn") -> bytes:
+    angle = 0.02 * tick
+    pose = SegmentPose(
+        quality="good",
+        sequence=tick,
+        world_from_segment=(float(np.cos(angle / 2)), float(np.sin(angle / 2)), 0.0, 0.0),
+    )
+    still = SegmentPose(quality="good", sequence=tick, world_from_segment=(1.0, 0.0, 0.0, 0.0))
+    return encode(
+        Skeleton(
+            time_ns=time_ns,
+            side="right",
+            origin=origin,
+            forward="facing",
+            trunk_from_world=(1.0, 0.0, 0.0, 0.0),
+            segments={"upper_arm_r": still, "forearm_r": pose},
+            positions={},
+            angles={"elbow_flexion": angle},
+        )
+    )
+
+
+@contextmanager
+def moving_arm(bus: Bus, room: str, origin: Origin = "worn") -> Iterator[None]:
+    """Skeletons at 50 Hz, with a host that tells its time."""
+    clock, stop = HostClock(), threading.Event()
+    tell_host_time(bus, room, "gateway", clock.now_ns)
+    info = Info(node="n", rate_hz=100.0, origin=origin, host="gateway")
+    bus.retain(keys.info(room, "p01", "forearm_r"), encode(info))
+
+    def move() -> None:
+        tick = 0
+        begun = time.monotonic()
+        while not stop.wait(max(0.0, begun + 0.02 * tick - time.monotonic())):
+            payload = arm(tick, clock.at(round((begun + 0.02 * tick) * 1e9)), origin)
+            bus.put(keys.skeleton(room, "p01", "right"), payload)
+            tick += 1
+
+    thread = threading.Thread(target=move)
+    thread.start()
+    try:
+        yield
+    finally:
+        stop.set()
+        thread.join()
+
+
+def test_an_arm_goes_out_while_it_moves_and_says_invalid_when_it_stops(endpoint: str, tmp_path: Path):
+    table = tmp_path / "joints.toml"
+    table.write_text(JOINTS)
+    port = PortSettings(interface="virtual", channel="brachium-out")
+    settings = service.CanSettings(endpoint=endpoint, room="out", port=port, joints=table)
+    dbc = database.load_file(Path(service.__file__).with_name("brachium_arm.dbc"))
+    elbow = dbc.get_message_by_name("RightElbowFlexion")
+    with Bus.open(endpoint) as bus, can.Bus(interface="virtual", channel="brachium-out") as wire:
+
+        def next_elbow() -> dict[str, object]:
+            while (frame := wire.recv(WITHIN_S)) is not None:
+                if frame.arbitration_id == elbow.frame_id:
+                    return elbow.decode(bytes(frame.data))
+            raise AssertionError("no frames")
+
+        with running(settings):
+            assert str(next_elbow()["Reason"]) == "silent"
+            alive = [int(next_elbow()["Alive"]) for _ in range(20)]
+            assert all((b - a) % 16 == 1 for a, b in pairwise(alive))
+            with moving_arm(bus, "out"):
+                until(lambda: next_elbow()["Valid"])
+                values = [v for v in (next_elbow() for _ in range(40)) if v["Valid"]]
+                assert values
+                for value in values:
+                    assert value["Speed"] == pytest.approx(1.0, abs=0.01)
+                assert values[-1]["Angle"] > values[0]["Angle"]
+            until(lambda: str(next_elbow()["Reason"]) == "silent")
+            assert all(not next_elbow()["Valid"] for _ in range(20))
+
+
+def test_an_emulated_arm_is_refused_in_frames_of_can_fd(endpoint: str, tmp_path: Path):
+    table = tmp_path / "joints.toml"
+    table.write_text(JOINTS)
+    port = PortSettings(interface="virtual", channel="brachium-fd", fd=True)
+    settings = service.CanSettings(endpoint=endpoint, room="fd", port=port, joints=table)
+    dbc = database.load_file(Path(service.__file__).with_name("brachium_arm.dbc"))
+    message = dbc.get_message_by_name("RightArm")
+    with Bus.open(endpoint) as bus, can.Bus(interface="virtual", channel="brachium-fd") as wire:
+
+        def next_reason() -> str:
+            frame = wire.recv(WITHIN_S)
+            assert frame is not None
+            assert (frame.arbitration_id, frame.is_fd, len(frame.data)) == (message.frame_id, True, 64)
+            read = message.decode(bytes(frame.data))
+            assert not read["ElbowFlexionValid"]
+            return str(read["ElbowFlexionReason"])
+
+        with running(settings), moving_arm(bus, "fd", "emulated"):
+            until(lambda: next_reason() == "origin")
+
+
+def test_an_interface_that_is_not_there_is_one_line():
+    with pytest.raises(NoInterface, match=r"socketcan nowhere0 cannot be opened: .*ip link set nowhere0 up"):
+        Port(PortSettings(channel="nowhere0"))
+
+
+def test_an_interface_that_goes_away_is_counted_and_opened_again(caplog: pytest.LogCaptureFixture):
+    port = Port(PortSettings(interface="virtual", channel="brachium-gone"))
+    assert port.send(0x123, bytes(8))
+    port._bus.shutdown()  # as when its cable is drawn
+    assert not port.send(0x123, bytes(8))
+    assert port.counts["interface_gone"] == 1
+    assert "is gone" in caplog.text
+    assert not port.send(0x123, bytes(8))
+    until(lambda: port.receive(0.01) is None and port.there)
+    assert port.send(0x123, bytes(8))
+    assert (port.counts["interface_back"], port.counts["not_sent"]) == (1, 2)
+    port.close()
+
+
+def test_a_controller_that_left_the_bus_is_counted():
+    port = Port(PortSettings(interface="virtual", channel="brachium-off"))
+    with can.Bus(interface="virtual", channel="brachium-off") as wire:
+        wire.send(can.Message(arbitration_id=0x40, is_error_frame=True, data=bytes(8)))
+        wire.send(can.Message(arbitration_id=0x04, is_error_frame=True, data=bytes(8)))
+        wire.send(can.Message(arbitration_id=0x04, is_remote_frame=True))
+        assert [port.receive(1.0) for _ in range(3)] == [None, None, None]
+    assert port.counts == {"bus_off": 1, "error_frames": 1, "remote_frames": 1}
+    port.close()

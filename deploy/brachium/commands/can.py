@@ -33,6 +33,16 @@ def configure(parser: argparse.ArgumentParser) -> None:
         metavar="SENSORS.toml",
         help="which sensors come in, and where they sit",
     )
+    parser.add_argument(
+        "--out", dest="joints", type=Path, metavar="JOINTS.toml", help="which arm goes out, and how"
+    )
+    parser.add_argument(
+        "--origin",
+        action="append",
+        choices=["emulated", "playback"],
+        default=[],
+        help="let an arm that nobody wears be valid for a machine too: for trying things out",
+    )
     parser.add_argument("--dbc", type=Path, help="of the sensors, in place of the one that their map names")
     parser.add_argument("--batch", type=whole(1, 64), default=5, help="samples in a packet on the network")
     parser.add_argument(
@@ -42,7 +52,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Serve the interface."""
-    if args.sensors is None:
+    if args.sensors is None and args.joints is None:
         raise Usage("say what the interface is for: --in SENSORS.toml, --out JOINTS.toml, or both")
     from brachium_nodes.can import service
     from brachium_nodes.can.port import PortSettings
@@ -63,5 +73,7 @@ def run(args: argparse.Namespace) -> int:
         dbc=args.dbc,
         batch=args.batch,
         calibrations=args.calibrations,
+        joints=args.joints,
+        origins=frozenset({"worn", *args.origin}),
     )
     return serve(lambda stop: service.run(settings, stop))

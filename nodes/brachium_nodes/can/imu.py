@@ -176,9 +176,7 @@ class CanImu:
         )
         try:
             read_samples(batch)  # the one check of shapes, finiteness and ranges
-            made = stamp(
-                Measured(batch, device_us.tolist()), self._memory, self._place, waiting[-1][2].arrived_ns
-            )
+            made = stamp(Measured(batch, device_us), self._memory, self._place, waiting[-1][2].arrived_ns)
         except WireError as error:
             self.drops[error.drop.value] += len(waiting)
             return []

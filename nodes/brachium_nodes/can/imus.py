@@ -3,14 +3,16 @@
 import logging
 from collections import Counter
 from collections.abc import Callable
+from pathlib import Path
 
 from brachium_nodes.can.imu import CanImu
 from brachium_nodes.can.sensor_map import CanSensor
 from brachium_nodes.host_claim import HostClaims
+from brachium_nodes.known_calibrations import NONE, CalibrationNews, KnownCalibrations
 from brachium_wire import keys
 from brachium_wire.bus import Bus
 from brachium_wire.codec import encode
-from brachium_wire.messages import SampleBatch, SensorCalibration
+from brachium_wire.messages import SampleBatch
 
 log = logging.getLogger(__name__)
 
@@ -29,11 +31,13 @@ class CanImus:
         host: str,
         sensors: tuple[CanSensor, ...],
         batch: int,
-        calibration_of: Callable[[str], SensorCalibration],
+        calibrations: Path | None,
     ) -> None:
+        """`batch`: samples in a packet; `calibrations`: a folder of sensor calibrations, as the gateway's."""
         self._bus, self._room, self._host = bus, room, host
         self._claims = HostClaims(bus, room, host)
-        self._calibration_of = calibration_of
+        self._known = KnownCalibrations(calibrations)
+        self._news = CalibrationNews(bus, room, self._known)
         self._imus = [CanImu(sensor, batch) for sensor in sensors]
         self._by_id = {
             number: (imu, message) for imu in self._imus for number, message in imu.sensor.messages.items()
@@ -65,9 +69,12 @@ class CanImus:
         if now_ns < self._status_ns:
             return
         self._status_ns = now_ns + STATUS_NS
+        fitted = self._news.drain()
         for imu in self._imus:
             sensor = imu.sensor
             if sensor.id in self._tokens:
+                if sensor.id in fitted:
+                    self._tell(imu)
                 self._bus.put(
                     keys.status(self._room, sensor.subject, sensor.segment), encode(imu.status(now_ns))
                 )
@@ -102,10 +109,14 @@ class CanImus:
             return False
         self._claims.claim(sensor.subject)
         self._tokens[sensor.id] = self._bus.announce(keys.alive(self._room, "node", sensor.id))
-        info = imu.info(self._host, self._calibration_of(sensor.id))
-        self._bus.retain(keys.info(self._room, sensor.subject, sensor.segment), encode(info))
+        self._tell(imu)
         log.info("sensor %s is heard: %s of %s", sensor.id, sensor.segment, sensor.subject)
         return True
+
+    def _tell(self, imu: CanImu) -> None:
+        sensor = imu.sensor
+        info = imu.info(self._host, self._known.of(sensor.id, NONE))
+        self._bus.retain(keys.info(self._room, sensor.subject, sensor.segment), encode(info))
 
     def _leave(self, imu: CanImu) -> None:
         sensor = imu.sensor

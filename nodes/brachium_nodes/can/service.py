@@ -6,20 +6,22 @@ import time
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from brachium_nodes.can.arm_sender import ArmSender
 from brachium_nodes.can.imus import CanImus
+from brachium_nodes.can.joint_table import JointTable, read_joints
 from brachium_nodes.can.port import Port, PortSettings
 from brachium_nodes.can.sensor_map import CanSensor, read_sensors
 from brachium_nodes.host_claim import checked_host
-from brachium_nodes.known_calibrations import calibrations_in
 from brachium_wire import keys
 from brachium_wire.bus import DEFAULT_ENDPOINT, Bus
 from brachium_wire.heart import Heart
 from brachium_wire.hosttime import HostClock, tell_host_time
+from brachium_wire.messages import Origin
 
 log = logging.getLogger(__name__)
 
 LOOK_S = 0.01
-"""Longest wait for a frame: the timer of what is sent, and how fast a stop is seen."""
+"""How often it is looked what time asks for; and how fast a stop is seen."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -38,6 +40,10 @@ class CanSettings:
     batch: int = 5
     """Samples in a packet on the network."""
     calibrations: Path | None = None
+    joints: Path | None = None
+    """The machine maker's table: what goes out."""
+    origins: frozenset[Origin] = frozenset({"worn"})
+    """Whose samples a machine may take for valid."""
 
 
 def run(settings: CanSettings, stop: threading.Event) -> None:
@@ -48,48 +54,74 @@ def run(settings: CanSettings, stop: threading.Event) -> None:
     """
     checked_host(settings.id)
     sensors = () if settings.sensors is None else read_sensors(settings.sensors, settings.dbc)
-    with Bus.open(settings.endpoint, stop=stop) as bus:
-        port = Port(settings.port)
-        try:
-            _Service(settings, bus, port, sensors).run(stop)
-        finally:
-            port.close()
+    table = None if settings.joints is None else read_joints(settings.joints)
+    port = Port(settings.port)
+    try:
+        with Bus.open(settings.endpoint, stop=stop, timeout_s=None) as bus:
+            _Service(settings, bus, port, sensors, table).run(stop)
+    finally:
+        port.close()
 
 
 class _Service:
-    def __init__(self, settings: CanSettings, bus: Bus, port: Port, sensors: tuple[CanSensor, ...]) -> None:
+    def __init__(
+        self,
+        settings: CanSettings,
+        bus: Bus,
+        port: Port,
+        sensors: tuple[CanSensor, ...],
+        table: JointTable | None,
+    ) -> None:
         self._clock, self._port = HostClock(), port
         self._heart = Heart(bus, settings.room, "can", settings.id)
         self._heart.text = port.name
         self._imus: CanImus | None = None
         if sensors:
             tell_host_time(bus, settings.room, settings.id, self._clock.now_ns)
-            known = calibrations_in(settings.calibrations)
-            self._imus = CanImus(bus, settings.room, settings.id, sensors, settings.batch, known)
+            self._imus = CanImus(
+                bus, settings.room, settings.id, sensors, settings.batch, settings.calibrations
+            )
+
+        self._sender: ArmSender | None = None
+        self._send_s = 0.0
+        if table is not None:
+            self._sender = ArmSender(bus, settings.room, table, settings.origins, fd=settings.port.fd)
+            self._send_s = 1.0 / table.rate_hz
 
     def run(self, stop: threading.Event) -> None:
-        due_s = time.monotonic()
+        """Take frames as they come; look after everything else at its time."""
+        look_s = send_s = time.monotonic()
         while not stop.is_set():
-            wait_s = due_s - time.monotonic()
-            frame = self._port.receive(min(max(wait_s, 0.0), LOOK_S))
+            due_s = look_s if self._sender is None else min(look_s, send_s)
+            frame = self._port.receive(max(due_s - time.monotonic(), 0.0))
             if frame is not None and self._imus is not None:
                 self._imus.receive(*frame, self._clock.now_ns())
-            if time.monotonic() >= due_s:
-                due_s = max(due_s + LOOK_S, time.monotonic())
-                self._tick()
-        if self._imus is not None:
-            self._imus.close(self._clock.now_ns())
-        self._beat(now=True)
+            now_s = time.monotonic()
+            if self._sender is not None and now_s >= send_s:
+                self._sender.tick(self._port)
+                send_s = max(send_s + self._send_s, now_s)  # late frames are left out, not caught up
+            if now_s >= look_s:
+                look_s = now_s + LOOK_S
+                self._look()
+        self._end()
 
-    def _tick(self) -> None:
+    def _look(self) -> None:
         if self._imus is not None:
             self._imus.tick(self._clock.now_ns())
         self._beat()
 
+    def _end(self) -> None:
+        if self._imus is not None:
+            self._imus.close(self._clock.now_ns())
+        if self._sender is not None:
+            self._sender.close()
+        self._beat(now=True)
+
     def _beat(self, *, now: bool = False) -> None:
         heart = self._heart
-        heart.counts.update({k: n - heart.counts[k] for k, n in self._port.counts.items()})
-        if self._imus is not None:
-            heart.counts.update({k: n - heart.counts[k] for k, n in self._imus.counts.items()})
-            heart.drops.update({k: n - heart.drops[k] for k, n in self._imus.drops.items()})
+        for part in (self._port, self._imus, self._sender):
+            if part is not None:
+                heart.counts |= part.counts
+                if not isinstance(part, Port):
+                    heart.drops |= part.drops
         heart.beat(now=now)
