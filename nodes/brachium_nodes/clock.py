@@ -33,7 +33,7 @@ class NodeClock:
     """Host time of one node. Feed it arrivals and exchanges; Published times grow with device time."""
 
     def __init__(self) -> None:
-        self._ups, self._downs = Below(), Below()
+        self._ups, self._downs = Below(MAX_SLOPE), Below(MAX_SLOPE)
         """Device time in us and host time less it in ns, both against the first; of questions negated."""
         self._quickest: tuple[int, int, int] | None = None
         """Round trip of an exchange, its device time and offset."""

@@ -11,11 +11,16 @@ BLOCK_US = 10_000_000
 
 
 class Below:
-    """The lower edge of points (x us, y ns) that come with growing x, over a window that moves along."""
+    """The lower edge of points (x us, y ns) that come with growing x, over a window that moves along.
 
-    def __init__(self) -> None:
+    No line is steeper than `steepest`, ns per us, either way.
+    """
+
+    def __init__(self, steepest: float) -> None:
+        self._steepest = steepest
         self._blocks: deque[list[Point]] = deque()
-        self._sums: deque[tuple[int, int]] = deque()  # of each block: points, and the sum of their x
+        self._sums: deque[list[int]] = deque()  # of each block: points, and the sum of their x
+        self._block = 0
         self._first: int | None = None
         self._last = 0
 
@@ -46,15 +51,21 @@ class Below:
         """Take a point; one that lies before the last is left out."""
         if self._blocks and x < self._last:
             return
-        if not self._blocks or x // BLOCK_US != self._last // BLOCK_US:
-            self._blocks.append([])
-            self._sums.append((0, 0))
-        if self._first is None:
-            self._first = x
         self._last = x
-        count, total = self._sums[-1]
-        self._sums[-1] = (count + 1, total + x)
-        _extend(self._blocks[-1], (x, y))
+        block = x // BLOCK_US
+        if not self._blocks or block != self._block:
+            self._block = block
+            self._blocks.append([(x, y)])
+            self._sums.append([1, x])
+            if self._first is None:
+                self._first = x
+            return
+        sums, corners = self._sums[-1], self._blocks[-1]
+        sums[0] += 1
+        sums[1] += x
+        last_x, last_y = corners[-1]
+        if y - last_y < self._steepest * (x - last_x) or x == last_x:  # else no line can touch it
+            _extend(corners, (x, y))
 
     def forget(self, before: int) -> None:
         """Forget the blocks that end before this x."""

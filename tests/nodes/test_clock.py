@@ -145,7 +145,7 @@ points = st.lists(st.tuples(st.integers(0, 60_000_000), st.integers(0, 20_000_00
 @given(points)
 def test_the_kept_points_are_the_lower_edge_of_all(made: list[tuple[int, int]]) -> None:
     made = sorted(made)
-    below = Below()
+    below = Below(0.2)
     for x, y in made:
         below.add(x, y)
     x, y = np.array(made).T
@@ -160,7 +160,7 @@ def test_the_middle_line_is_the_linear_programme_s() -> None:
         x_up, x_down = (np.sort(rng.integers(0, 60_000_000, n)) for n in (300, 200))
         up = np.rint(skew * x_up + 1e6 + rng.gamma(1.5, 2e6, 300))
         down = np.rint(skew * x_down - 1e6 - rng.gamma(1.5, 2e6, 200))
-        above, minus_below = Below(), Below()
+        above, minus_below = Below(0.2), Below()
         for x, y in zip(x_up.tolist(), up.tolist(), strict=True):
             above.add(x, round(y))
         for x, y in zip(x_down.tolist(), down.tolist(), strict=True):
