@@ -13,7 +13,8 @@ import numpy.typing as npt
 
 from brachium_body import rotation
 from brachium_body.kinematics import TRUNK_FROM_NEUTRAL, joint_orientations
-from brachium_body.segments import SIDES, arm_segments, part_of, side_of
+from brachium_body.segments import SIDES, arm_segments
+from brachium_fusion.alignment_warnings import warnings_for
 from brachium_fusion.joint_alignment import JointAlignment
 from brachium_wire.messages import Forward
 
@@ -165,8 +166,13 @@ def align(
         mounting=mounting,
         assumed=frozenset(assumed),
         scores=scores,
-        warnings=warnings_for(forward, assumed, scores),
+        warnings=warnings_for(forward, heading, assumed, [with_magnetometers(sensors)], scores),
     )
+
+
+def with_magnetometers(sensors: dict[str, PoseSensor]) -> set[str]:
+    """Return the segments whose sensors share one world."""
+    return {segment for segment, sensor in sensors.items() if sensor.magnetometer}
 
 
 def _forward(
@@ -249,28 +255,3 @@ def _horizontal(vector: Floats) -> Floats | None:
 
 def _turn(start: Floats, end: Floats) -> float:
     return float(np.arctan2(start[0] * end[1] - start[1] * end[0], start[0] * end[0] + start[1] * end[1]))
-
-
-def warnings_for(forward: Forward, assumed: set[str], scores: dict[str, float]) -> tuple[str, ...]:
-    """Return what a person should know of an alignment, one line each."""
-    warnings = []
-    if forward == "none":
-        warnings.append(
-            "no rule says where forward is: planes of movement are relative to an assumed heading; "
-            "give facing_deg (with magnetometers), or the nominal mounting of a sternum or upper-arm sensor"
-        )
-    if assumed:
-        warnings.append(
-            f"heading of {', '.join(sorted(assumed))} is assumed: nothing ties these sensors to one another, "
-            "so angles between them, elbow and wrist included, can be far off and even have the wrong sign; "
-            "give their nominal mounting"
-        )
-    for name, value in scores.items():
-        if name.startswith("from_nominal_deg_") and value > 45.0:
-            segment = name.removeprefix("from_nominal_deg_")
-            place = f"{side_of(segment) or ''} {part_of(segment).replace('_', ' ')}".strip()
-            warnings.append(
-                f"{segment} sits {value:.0f} deg from its nominal mounting: "
-                f"check that the sensor is on the {place}, the right way round"
-            )
-    return tuple(warnings)

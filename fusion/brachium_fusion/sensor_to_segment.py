@@ -16,6 +16,7 @@ import numpy.typing as npt
 
 from brachium_body import rotation
 from brachium_body.segments import SIDES, Side, arm_segments
+from brachium_fusion.alignment_warnings import warnings_for
 from brachium_fusion.elbow_alignment import ElbowFound, ElbowSensors, Refused, find_elbow
 from brachium_fusion.free_pose import pose_from_movement
 from brachium_fusion.hand_alignment import hand_mounting, wrist_heading
@@ -27,7 +28,7 @@ from brachium_fusion.pose import (
     PoseSensor,
     align,
     pose_orientations,
-    warnings_for,
+    with_magnetometers,
 )
 from brachium_fusion.segment_frames import ElbowPose
 from brachium_fusion.segment_records import SensorRecord, Span, SpanKind, check, held_pose, rows_of
@@ -184,13 +185,14 @@ def _joined(
     axes = {found.joint.near: found.axis_in_pose for found in elbows.values()}
     base = align(sensors, targets, facing_deg=facing_deg, elbow_axis=axes)
     heading, mounting = dict(base.heading), dict(base.mounting)
-    scores, assumed = dict(base.scores), set(base.assumed)
+    scores, assumed, tied = dict(base.scores), set(base.assumed), [with_magnetometers(sensors)]
     time_s = 0.5 * (pose.first + pose.end) / rate_hz
     for side, found in elbows.items():
         upper, forearm, hand = arm_segments(side)
         heading[forearm] = float(rotation.wrap(heading[upper] + found.joint.heading_rad))
         mounting[upper], mounting[forearm] = found.upper_from_sensor, found.forearm_from_sensor
         scores |= found.scores
+        tied.append({upper, forearm})
         assumed.discard(forearm)
         if upper in assumed:
             assumed.add(forearm)
@@ -201,7 +203,10 @@ def _joined(
             turn = wrist_heading(_motion(records[forearm]), _motion(records[hand]), rows, time_s, rate_hz)
             if turn is not None:
                 heading[hand] = float(rotation.wrap(heading[forearm] + turn))
+                tied.append({forearm, hand})
                 assumed.discard(hand)
+                if forearm in assumed:
+                    assumed.add(hand)
         stands = rotation.multiply(rotation.about(2, heading[forearm]), rotation.mean(still[forearm]))
         mounting[hand] = hand_mounting(
             rotation.multiply(stands, rotation.inverse(mounting[forearm])),
@@ -217,5 +222,5 @@ def _joined(
         scores=scores,
         joints={f"elbow_{side[0]}": found.joint for side, found in elbows.items()},
         refused=refused,
-        warnings=warnings_for(base.forward, assumed, scores),
+        warnings=warnings_for(base.forward, heading, assumed, tied, scores),
     )

@@ -33,7 +33,7 @@ _NEEDS: dict[str, tuple[int, ...]] = {
     **dict.fromkeys(ELBOW, (1, 2)),
     **dict.fromkeys(WRIST, (2, 3)),
     **dict.fromkeys(TRUNK, (0,)),
-    **dict.fromkeys(CLAVICLE, (1, 2)),
+    **dict.fromkeys(CLAVICLE, (0, 1, 2)),
     "shoulder": (0,),
     "elbow": (0, 1),
     "wrist": (0, 1, 2),

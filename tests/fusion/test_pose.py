@@ -9,6 +9,7 @@ from brachium_body import rotation
 from brachium_body.angles import INDEX, joint_angles
 from brachium_body.kinematics import TRUNK_FROM_NEUTRAL, SegmentOrientations, between, joint_orientations
 from brachium_body.segments import SEGMENTS, arm_segments
+from brachium_fusion.alignment_warnings import warnings_for
 from brachium_fusion.pose import Alignment, PoseSensor, align, pose_orientations
 
 RIGHT_ARM = arm_segments("right")
@@ -292,7 +293,37 @@ def test_a_heading_that_nothing_ties_is_named_in_a_warning() -> None:
     }
     alignment = align(sensors, NEUTRAL)
     assert alignment.assumed == {"forearm_r"}
-    assert any("heading of forearm_r is assumed" in w for w in alignment.warnings)
+    (warning,) = alignment.warnings
+    assert warning.startswith("heading of forearm_r is assumed against upper_arm_r: ")
+    assert "so elbow angles can be far off" in warning
+
+
+def test_a_heading_of_the_sternum_alone_is_said_to_touch_the_shoulders_alone() -> None:
+    tied = [{"upper_arm_r", "forearm_r"}, {"upper_arm_l", "forearm_l"}]
+    segments = {"sternum", *tied[0], *tied[1]}
+    (warning,) = warnings_for("elbow", segments, {"sternum"}, tied, {})
+    assert warning.startswith("heading of sternum is assumed against upper_arm_l and upper_arm_r: ")
+    assert "so shoulder and trunk angles" in warning
+    assert "elbow" not in warning
+
+
+def test_one_sensor_has_no_other_to_be_tied_to() -> None:
+    for segment, what in (("upper_arm_r", "planes of movement"), ("hand_r", "where it points")):
+        alignment = align({segment: sensor(TRUNK_FROM_NEUTRAL, None, magnetometer=False)}, NEUTRAL)
+        (warning,) = alignment.warnings
+        assert f"the heading of {segment} against the trunk is assumed, and {what}" in warning
+
+
+def test_magnetometers_tie_sensors_to_one_another_though_not_to_the_trunk() -> None:
+    (warning,) = case().warnings
+    assert "heading of forearm_r and upper_arm_r against the trunk" in warning
+
+
+def test_a_wrist_whose_heading_is_known_says_nothing_of_the_elbow() -> None:
+    segments = ("upper_arm_r", "forearm_r", "hand_r")
+    (first, second) = warnings_for("none", segments, segments, [{"forearm_r", "hand_r"}], {})
+    assert first.startswith("no rule says where forward is")
+    assert "heading of forearm_r is assumed against upper_arm_r" in second
 
 
 def test_an_alignment_comes_back_from_its_state() -> None:
