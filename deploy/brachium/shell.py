@@ -29,6 +29,9 @@ PARENT = "BRACHIUM_PARENT"
 
 log = logging.getLogger("brachium")
 
+Options = argparse.ArgumentParser | argparse._ArgumentGroup
+"""Where options are added."""
+
 
 class Command(Protocol):
     """What a module of `brachium.commands` holds. Its docstring's last paragraph is an example."""
@@ -83,12 +86,12 @@ def run_command(name: str, summary: str, module: Any, words: list[str]) -> int:
         return code
 
 
-def add_room(parser: argparse.ArgumentParser) -> None:
+def add_room(parser: Options) -> None:
     """Add --room."""
     parser.add_argument("--room", default=keys.DEFAULT_ROOM, help="the room's name in keys")
 
 
-def add_network(parser: argparse.ArgumentParser) -> None:
+def add_network(parser: Options) -> None:
     """Add the options of every command that joins a network."""
     add_room(parser)
     parser.add_argument("--endpoint", default="tcp/127.0.0.1:7447", help="where the router listens")

@@ -2,8 +2,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from brachium.evaluation.errors import angle_error, covered, eq17, per_cycle, relative_angle, rms
+from brachium.evaluation.errors import angle_error, covered, per_cycle, relative_angle, rms
 from brachium.evaluation.loss import kept
+from brachium_viewer.statistics import eq17
 
 
 def test_rms_of_numbers_and_of_vectors_leaves_out_what_is_not_known():

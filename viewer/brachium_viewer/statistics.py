@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -89,3 +90,23 @@ def orientation_errors_deg(estimate: Array, reference: Array) -> tuple[Array, Ar
     heading = 2.0 * np.arctan2(z, w)
     inclination = 2.0 * np.arctan2(np.hypot(x, y), np.hypot(w, z))
     return np.degrees(total), wrap_deg(np.degrees(heading)), np.degrees(inclination)
+
+
+class NormFigures(NamedTuple):
+    """Tsilomitrou's eq 17, m."""
+
+    mae: float
+    largest: float
+    rmse: float
+
+
+def eq17(estimate: Array, reference: Array) -> NormFigures | None:
+    """Return the figures of eq 17 for positions (n, 3) from the chest.
+
+    It compares distances from the chest, not places, so most of an error does not show (erratum T17).
+    """
+    apart = np.abs(np.linalg.norm(estimate, axis=1) - np.linalg.norm(reference, axis=1))
+    apart = apart[np.isfinite(apart)]
+    if not apart.size:
+        return None
+    return NormFigures(float(apart.mean()), float(apart.max()), float(np.sqrt((apart**2).mean())))

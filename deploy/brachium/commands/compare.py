@@ -1,6 +1,11 @@
 """Compare two results, or a result and a reference: errors of A against B.
 
+With --live A and B are subjects of a running network, a person's own nodes and a second set of sensors on the
+same segments; with --emulate that network is started here, its wearer emulated.
+
 brachium compare angles.csv truth.parquet --lag estimate
+  brachium compare --live p01 p01.ref --seconds 60
+  brachium compare --live p01 p01.ref --emulate --seconds 30
 """
 
 import argparse
@@ -8,14 +13,14 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from brachium.option_types import real
-from brachium.shell import Usage, add_json, print_json
+from brachium.option_types import duration_s, real, seed
+from brachium.shell import Usage, add_json, add_network, print_json, stop_on_signals
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
     """Add the options."""
-    parser.add_argument("a", type=Path, metavar="A", help="a result (.csv or .parquet), as solve writes it")
-    parser.add_argument("b", type=Path, metavar="B", help="another, or a reference, as a truth.parquet")
+    parser.add_argument("a", metavar="A", help="a result (.csv or .parquet), as solve writes it")
+    parser.add_argument("b", metavar="B", help="another, or a reference, as a truth.parquet")
     parser.add_argument("--lag", help="seconds A is late, or: estimate (default: as B's capture says)")
     parser.add_argument("--mask", metavar="COLUMN", help="of B; only rows count where it is true")
     parser.add_argument("--from", dest="from_s", type=real(), metavar="S", help="only from this time of B on")
@@ -34,13 +39,36 @@ def configure(parser: argparse.ArgumentParser) -> None:
         "--figure", type=Path, metavar="FILE", help="draw Bland-Altman plots (.svg, .png or .pdf)"
     )
     add_json(parser)
+    live = parser.add_argument_group("live")
+    live.add_argument("--live", action="store_true", help="A and B are subjects; B's errors against A")
+    live.add_argument(
+        "--seconds", type=duration_s, metavar="S", help="so long, once both are there (default: till Ctrl-C)"
+    )
+    live.add_argument(
+        "--emulate",
+        action="store_true",
+        help="start a network here, its wearer with a node and a Shimmer3 on one segment",
+    )
+    live.add_argument("--exercise", default="elbow-flexion", help="of the emulated wearer")
+    live.add_argument("--segment", default="forearm_r", help="that carries both")
+    live.add_argument("--level", default="typical", help="of the emulated sensors' errors")
+    live.add_argument("--seed", type=seed, default=1, help="of everything random")
+    live.add_argument(
+        "--shimmer-delay", type=real(0.0, 0.4), default=0.04, metavar="S", help="from its sample to its port"
+    )
+    add_network(live)
 
 
 def run(args: argparse.Namespace) -> int:
     """Compare, and tell."""
+    if args.live:
+        return _live(args)
+    if args.emulate or args.seconds is not None:
+        raise Usage("--emulate and --seconds go with --live")
     from brachium_viewer import compare, compare_text
 
-    for path in (args.a, args.b):
+    a, b = Path(args.a), Path(args.b)
+    for path in (a, b):
         if not path.exists():
             raise FileNotFoundError(2, "no such file", str(path))
     chosen: dict[str, Any] = {
@@ -50,9 +78,7 @@ def run(args: argparse.Namespace) -> int:
     }
     if args.lag is not None:
         chosen["lag"] = args.lag if args.lag == "estimate" else _seconds(args.lag)
-    found = compare.compare(
-        args.a, args.b, replace(compare.settings_beside(args.b), **chosen), figure=args.figure
-    )
+    found = compare.compare(a, b, replace(compare.settings_beside(b), **chosen), figure=args.figure)
     if args.json:
         print_json(found)
     else:
@@ -65,3 +91,28 @@ def _seconds(text: str) -> float:
         return real()(text)
     except argparse.ArgumentTypeError:
         raise Usage(f"--lag takes seconds or the word estimate; came {text!r}") from None
+
+
+def _live(args: argparse.Namespace) -> int:
+    from brachium_viewer import live_comparison, two_sensors_text
+    from brachium_wire import keys
+
+    for name in (args.a, args.b):
+        keys.subject_chunk(name)
+    if args.a == args.b:
+        raise Usage(f"{args.a} cannot be compared with itself; a second set of sensors is {args.a}.ref")
+    stop = stop_on_signals()
+    if args.emulate:
+        from brachium import live_experiment
+
+        found = live_experiment.run(args, stop)
+    else:
+        settings = live_comparison.LiveSettings(
+            a=args.a, b=args.b, endpoint=args.endpoint, room=args.room, seconds=args.seconds
+        )
+        found = live_comparison.run(settings, stop)
+    if args.json:
+        print_json(found)
+    else:
+        print(two_sensors_text.text(found), end="")
+    return 0

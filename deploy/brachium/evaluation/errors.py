@@ -41,26 +41,6 @@ def relative_angle(a: Floats, b: Floats, true_a: Floats, true_b: Floats) -> Floa
     return rotation.angle_between(found, rotation.multiply(rotation.inverse(true_a), true_b))
 
 
-class NormFigures(NamedTuple):
-    """Tsilomitrou's eq 17, m."""
-
-    mae: float
-    largest: float
-    rmse: float
-
-
-def eq17(estimate: Floats, reference: Floats) -> NormFigures | None:
-    """Return the figures of eq 17 for positions (n, 3) from the chest.
-
-    It compares distances from the chest, not places, so most of an error does not show (erratum T17).
-    """
-    apart = np.abs(np.linalg.norm(estimate, axis=1) - np.linalg.norm(reference, axis=1))
-    apart = apart[np.isfinite(apart)]
-    if not apart.size:
-        return None
-    return NormFigures(float(apart.mean()), float(apart.max()), float(np.sqrt((apart**2).mean())))
-
-
 FEWEST_MEANS = 3
 """Wilcoxon's test says nothing of fewer."""
 

@@ -10,12 +10,14 @@ import numpy.typing as npt
 
 from brachium.evaluation.context import Context
 from brachium.evaluation.emulated import Emulated
-from brachium.evaluation.errors import angle_error, eq17, rms
+from brachium.evaluation.errors import angle_error, rms
 from brachium.evaluation.solving import word
 from brachium.evaluation.tables import Cell, Table
 from brachium.evaluation.trials import Trial, stated_angles
 from brachium_nodes.sensors import Level
 from brachium_nodes.session import Reading
+from brachium_viewer.statistics import eq17
+from brachium_viewer.two_sensors_text import PAPER
 
 Floats = npt.NDArray[np.float64]
 
@@ -38,9 +40,9 @@ class Experiment(NamedTuple):
 
 EXPERIMENTS: tuple[Experiment, ...] = (
     Experiment("4 elbow", "elbow-flexion", "forearm",
-               {"wrist": (12.6, 50.9, 16.1), "hand": (18.2, 70.6, 22.9)}, ("theta4", "theta5")),
+               PAPER["forearm"], ("theta4", "theta5")),
     Experiment("5 abduction", "shoulder-abduction", "upper_arm",
-               {"elbow": (6.1, 46.2, 8.7), "wrist": (7.2, 54.7, 10.3), "hand": (7.6, 57.7, 10.9)},
+               PAPER["upper_arm"],
                ("theta1", "theta2", "theta3", "isb_elevation")),
     Experiment("wrist", "wrist-flexion", "hand", {"hand": ()}, ("theta6", "theta7")),
 )  # fmt: skip

@@ -48,7 +48,8 @@ class EmulatedPort:
 
     def __init__(self, twin: ShimmerTwin, settings: WearerSettings) -> None:
         self._twin = twin
-        self._wearer, self._name, self.segment = twin_of(settings)
+        self._wearer, name, self.segment = twin_of(settings)
+        self._name: Segment = name
         self._clock = self._wearer.clocks[self._name]
         self._calibration = self._wearer.info(self._name).calibration
         self.device = EmulatedShimmer(self._measured, seed=settings.seed)
