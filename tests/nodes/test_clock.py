@@ -160,7 +160,7 @@ def test_the_middle_line_is_the_linear_programme_s() -> None:
         x_up, x_down = (np.sort(rng.integers(0, 60_000_000, n)) for n in (300, 200))
         up = np.rint(skew * x_up + 1e6 + rng.gamma(1.5, 2e6, 300))
         down = np.rint(skew * x_down - 1e6 - rng.gamma(1.5, 2e6, 200))
-        above, minus_below = Below(0.2), Below()
+        above, minus_below = Below(MAX_SLOPE), Below(MAX_SLOPE)
         for x, y in zip(x_up.tolist(), up.tolist(), strict=True):
             above.add(x, round(y))
         for x, y in zip(x_down.tolist(), down.tolist(), strict=True):
