@@ -42,6 +42,7 @@ def samples(
     """Return the batches that a datagram brings, one a sensor: what it carries, or that a sensor rests."""
     turns: dict[int, list[Quaternion]] = {}
     alive = False
+    measured = any(isinstance(record, r.Rotation | r.Acceleration) for record in datagram.records)
     for record in datagram.records:
         if isinstance(record, r.Rotation):
             turns.setdefault(record.sensor, []).append(record.world_from_sensor)
@@ -50,19 +51,19 @@ def samples(
     actions: list[Action] = []
     for number, sensor in tracker.sensors.items():
         came = turns.get(number, [])[-MAX_SAMPLES:]
-        missed = sensor.datagrams(lost, len(came))
+        sensor.datagram(lost, len(came), measured=measured)
         sensor.answered += alive
         if sensor.admission is None:
             drops["no_segment"] += len(came)
         elif came:
-            actions.append(_turned(tracker, sensor, came, missed, now_ns))
+            actions.append(_turned(tracker, sensor, came, now_ns))
         elif alive and sensor.is_silent(now_ns) and sensor.rests:
             actions += _rested(tracker, sensor, now_ns)
     return actions
 
 
-def _turned(tracker: Tracker, sensor: Sensor, came: list[Quaternion], missed: int, now_ns: int) -> Action:
-    sensor.rotated(came[-1], now_ns)
+def _turned(tracker: Tracker, sensor: Sensor, came: list[Quaternion], now_ns: int) -> Action:
+    missed = sensor.rotated(came[-1], now_ns)
     last_ns = now_ns - tracker.trips.delay_ns
     times = [last_ns - (len(came) - 1 - i) * _period_ns(sensor) for i in range(len(came))]
     return _publish(tracker, sensor, came, times, missed, now_ns)

@@ -92,22 +92,32 @@ class Sensor:
     counted_ns: int = 0
     """Samples received at the last status, and when that was."""
 
-    def rotated(self, orientation: Quaternion, received_ns: int) -> None:
-        """Take an orientation."""
-        self.orientation, self.rotated_ns = orientation, received_ns
-        self.asked = self.answered = self.lost = 0
+    def datagram(self, lost: int, carried: int, *, measured: bool) -> None:
+        """Take that a datagram with `carried` samples came after `lost` datagrams that did not.
 
-    def datagrams(self, lost: int, carried: int) -> int:
-        """Take that a datagram with `carried` samples came after `lost` that did not.
-
-        Return how many samples those will have carried: as many as others do in the mean.
+        `measured`: it carries what some sensor measured, and no mere answer.
         """
         self.lost += lost
-        self._owed += lost * self.per_datagram
-        self.per_datagram += LEARN * (carried - self.per_datagram)
-        missed = int(self._owed)
+        if measured:
+            self.per_datagram += LEARN * (carried - self.per_datagram)
+
+    def rotated(self, orientation: Quaternion, received_ns: int) -> int:
+        """Take an orientation. Return how many samples are missing before it.
+
+        Datagrams were lost, not samples: each of them that was no unanswered heartbeat will have carried as
+        many samples as others do in the mean.
+        """
+        self._owed += max(0, self.lost - self.unanswered) * self.per_datagram
+        missed = round(self._owed)
         self._owed -= missed
+        self.orientation, self.rotated_ns = orientation, received_ns
+        self.asked = self.answered = self.lost = 0
         return missed
+
+    @property
+    def unanswered(self) -> int:
+        """Heartbeats since the last rotation that the tracker did not answer."""
+        return max(0, self.asked - self.answered)
 
     def is_silent(self, now_ns: int) -> bool:
         """Return whether the sensor may be at rest, or its tracker gone."""
@@ -120,7 +130,7 @@ class Sensor:
         A tracker sends none while its orientation stays the same (within 1e-4 of each component). What was
         lost since is then no more than the heartbeats that were not answered.
         """
-        return self.orientation is not None and self.lost <= self.asked - self.answered
+        return self.orientation is not None and self.lost <= self.unanswered
 
 
 @dataclass(slots=True, eq=False)
