@@ -64,6 +64,25 @@ class Shift(NamedTuple):
     sd: Floats
 
 
+class Moved:
+    """Rates and forces of a batch, and of the last sample before it, calibrated; joined when one asks."""
+
+    __slots__ = ("_joined", "_own")
+
+    def __init__(self, gyr: Floats, acc: Floats, before: tuple[Floats, Floats]) -> None:
+        self._own = gyr, acc, before
+        self._joined: Floats | None = None
+
+    def rows(self) -> Floats:
+        """Return gyr and acc (n + 1, 6): of the last sample before the batch, then of its own."""
+        if self._joined is None:
+            gyr, acc, (gyr_before, acc_before) = self._own
+            joined = np.empty((len(gyr) + 1, 6))
+            joined[0, :3], joined[0, 3:], joined[1:, :3], joined[1:, 3:] = gyr_before, acc_before, gyr, acc
+            self._joined = joined
+        return self._joined
+
+
 @dataclass(slots=True, eq=False)
 class Block:
     """A batch after the filter, and the last sample before it."""
@@ -73,8 +92,8 @@ class Block:
     before: Floats
     times: list[int]
     quats: Floats
-    motion: Floats | None
-    """(n + 1, 6) gyr and acc, calibrated: of the last sample before it, then of its own."""
+    moved: Moved | None
+    """None of a sensor that delivers orientation only."""
     first_sequence: int
     received_ns: int
     gap: Quality | None
@@ -143,15 +162,16 @@ class Timeline:
         None where `at` gives nothing, and for a sensor that delivers orientation only.
         """
         block = self._block_at(time_ns)
-        if block is None or block.motion is None:
+        if block is None or block.moved is None:
             return None
+        rows = block.moved.rows()
         after = bisect_left(block.times, time_ns)
-        t1, value = block.times[after], block.motion[after + 1]
+        t1, value = block.times[after], rows[after + 1]
         if time_ns < t1:
             t0 = block.times[after - 1] if after > 0 else block.before_ns
             if after == 0 and (t0 == 0 or time_ns < t0 or block.gap == "missing"):
                 return None
-            before = block.motion[after]
+            before = rows[after]
             value = before + (time_ns - t0) / (t1 - t0) * (value - before)
         return Motion(value[:3], value[3:])
 
@@ -184,7 +204,7 @@ class Timeline:
                 b.before.tolist(),
                 b.times,
                 b.quats.ravel().tolist(),
-                None if b.motion is None else b.motion.ravel().tolist(),
+                None if b.moved is None else b.moved.rows().ravel().tolist(),
                 b.first_sequence,
                 b.received_ns,
                 b.gap,
@@ -201,8 +221,12 @@ class Timeline:
                 np.array(before),
                 times,
                 np.array(quats).reshape(-1, 4),
-                None if motion is None else np.array(motion).reshape(-1, 6),
+                None if rows is None else _moved(np.array(rows).reshape(-1, 6)),
                 *rest,
             )
-            for before_ns, before, times, quats, motion, *rest in state
+            for before_ns, before, times, quats, rows, *rest in state
         )
+
+
+def _moved(rows: Floats) -> Moved:
+    return Moved(rows[1:, :3], rows[1:, 3:], (rows[0, :3], rows[0, 3:]))
