@@ -61,7 +61,10 @@ def solve(
         for s, raw in material.series.items()
     }
     time_s, rate_hz = grid(series)
-    tracked = {s: _tracked(on_grid(one, time_s), rate_hz) for s, one in series.items()}
+    tracked = {
+        s: _tracked(on_grid(one, time_s), rate_hz, own_heading=material.infos[s].heading_free)
+        for s, one in series.items()
+    }
     best.magnetometer = any(one.magnetometer and one.raw for one in tracked.values())
     best.parts["orientation"] = _filtered(tracked)
     spans = rows_of_spans(material, tracked, time_s, rate_hz)
@@ -101,11 +104,14 @@ def _filtered(tracked: Mapping[str, Tracked]) -> str:
     )
 
 
-def _tracked(samples: Uniform, rate_hz: float) -> Tracked:
-    """Return one sensor's orientation at every instant of the grid."""
+def _tracked(samples: Uniform, rate_hz: float, *, own_heading: bool) -> Tracked:
+    """Return one sensor's orientation at every instant of the grid.
+
+    `own_heading`: that of the orientations it delivers is its own.
+    """
     if samples.quat is not None:
         nothing = np.zeros(len(samples.quat), dtype=np.bool_)
-        return Tracked(samples, samples.quat, nothing, magnetometer=True, raw=False)
+        return Tracked(samples, samples.quat, nothing, magnetometer=not own_heading, raw=False)
     found = smooth_orientation(samples.gyr, samples.acc, samples.mag, rate_hz)
     return Tracked(
         samples, found.world_from_sensor, found.disturbed, magnetometer=samples.mag is not None, raw=True
