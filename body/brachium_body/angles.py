@@ -29,6 +29,15 @@ ELBOW: tuple[str, ...] = (*COLUMNS[3:5], *COLUMNS[10:12], *COLUMNS[17:20])
 WRIST: tuple[str, ...] = (*COLUMNS[5:7], *COLUMNS[12:14])
 TRUNK: tuple[str, ...] = COLUMNS[20:23]
 CLAVICLE: tuple[str, ...] = COLUMNS[23:25]
+SHARING_QUALITY: dict[str, tuple[str, ...]] = {
+    "shoulder_angles": SHOULDER,
+    "elbow_angles": ELBOW,
+    "wrist_angles": WRIST,
+    "trunk_angles": TRUNK,
+    "clavicle_angles": CLAVICLE,
+}
+"""Angles of one joint rest on the same segments, so one quality holds for all of them: by the name that
+tables give it."""
 
 
 class _Entries(NamedTuple):

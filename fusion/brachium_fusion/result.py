@@ -9,6 +9,7 @@ import numpy.typing as npt
 from brachium_body.angles import CLAVICLE, COLUMNS, TRUNK
 from brachium_body.kinematics import JOINTS
 from brachium_body.segments import SIDES, Side, arm_segments, suffix
+from brachium_fusion.result_quality import NAMES, qualities
 from brachium_wire.messages import Skeleton
 
 Group = Literal["segments", "sensors", "positions", "shift", "theta", "clinical", "isb", "trunk", "quality"]
@@ -42,6 +43,8 @@ def tabulate(
 
     With one arm, columns without a segment in their name have no ending; with both they end in `_r` or `_l`.
     An instant without a skeleton, or a number that it lacks, is NaN; its quality is "".
+    `quality_elbow_angles` and `quality_wrist_position` tell of a joint's numbers, `quality_forearm_r` of a
+    segment.
     """
     row_of = {t: i for i, t in enumerate(times_ns)}
     found: dict[Side, list[tuple[int, Skeleton]]] = {side: [] for side in SIDES}
@@ -67,12 +70,27 @@ def tabulate(
         ending = suffix(side) if len(by_side) > 1 else ""
         _add_arm(result, rows, ending, groups, first=side == next(iter(by_side)))
     if "quality" in groups:
+        for side, rows in by_side.items():
+            ending = suffix(side) if len(by_side) > 1 else ""
+            shown = _shown(groups, trunk=side == next(iter(by_side)))
+            for name, words in qualities(n, rows, shown).items():
+                result.add(f"{name}{'' if name.endswith('trunk_angles') else ending}", words)
         for segment, rows in segments.items():
             quality = np.full(n, "", dtype="<U16")
             for row, skeleton in rows:
                 quality[row] = skeleton.segments[segment].quality
             result.add(f"quality_{segment}", quality)
     return result
+
+
+def _shown(groups: Sequence[Group], *, trunk: bool) -> list[str]:
+    """Return whose quality is told: that of what the groups show."""
+    shown = []
+    for name, columns in NAMES.items():
+        of = {"positions"} if name.endswith("_position") else {_group(column) for column in columns}
+        if of & set(groups) and (trunk or name != "trunk_angles"):
+            shown.append(name)
+    return shown
 
 
 def _segments(by_side: dict[Side, list[tuple[int, Skeleton]]]) -> dict[str, list[tuple[int, Skeleton]]]:

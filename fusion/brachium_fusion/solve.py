@@ -14,6 +14,7 @@ from brachium_fusion.best_arm import solve_arm
 from brachium_fusion.best_material import Material
 from brachium_fusion.orientation import FilterName
 from brachium_fusion.result import tabulate
+from brachium_fusion.result_quality import assumptions
 from brachium_fusion.settings import Settings
 from brachium_fusion.shoulder_model import NOT_OBSERVABLE_WITHOUT_STERNUM
 from brachium_fusion.solve_terms import (
@@ -181,7 +182,7 @@ def _finish(settings: SolveSettings, outcome: Outcome) -> SolveReport:
     skeletons, chosen, alignment = outcome.skeletons, outcome.chosen, outcome.alignment
     if not skeletons:
         raise SolveError(f"{settings.input}: no instant could be solved; is any segment of an arm in it?")
-    forward = skeletons[-1].forward
+    forward, assumed = skeletons[-1].forward, assumptions(skeletons)
     if settings.out is not None:
         result = tabulate(skeletons, outcome.times_ns, outcome.times_s, settings.groups)
         table.write(
@@ -196,6 +197,7 @@ def _finish(settings: SolveSettings, outcome: Outcome) -> SolveReport:
                 "mode": settings.mode,
                 "forward": forward,
                 "origin": skeletons[-1].origin,
+                "assumed": assumed,
                 **outcome.metadata,
             },
         )
@@ -220,6 +222,7 @@ def _finish(settings: SolveSettings, outcome: Outcome) -> SolveReport:
         mode=settings.mode,
         parts=outcome.parts,
         refused=outcome.refused | ({} if alignment is None else alignment.refused),
+        assumptions=assumed,
         live_compared=live[0] if live else 0,
         live_angle_rad=live[1] if live else None,
         live_position_m=live[2] if live else None,

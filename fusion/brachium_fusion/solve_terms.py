@@ -67,6 +67,8 @@ class SolveReport:
     """With `best`: what was used for each part of the way."""
     refused: dict[str, str] = field(default_factory=dict)
     """What could not be had, and the reason."""
+    assumptions: dict[str, str] = field(default_factory=dict)
+    """What is not measured but rests on an assumption, `elbow_angles`, and on which."""
     live_compared: int = 0
     """Of a recording: instants that were live, too, and how far the two differ at most."""
     live_angle_rad: float | None = None

@@ -146,6 +146,10 @@ def expected_columns(sides) -> list[str]:
             for c in COLUMNS
             if not (c.startswith("trunk_") and side != sides[0])
         ]
+    told = [f"{j}_angles" for j in ("shoulder", "elbow", "wrist", "clavicle")]
+    told += [f"{j}_position" for j in ("shoulder", "elbow", "wrist", "hand")]
+    ends = [f"_{side[0]}" for side in sides] if both else [""]
+    names += [f"quality_{name}{end}" for end in ends for name in told]
     return names + [f"quality_{s}" for s in segments]
 
 
@@ -169,7 +173,37 @@ def test_columns_are_chosen_by_group(made, tmp_path) -> None:
     folder = capture_folder(tmp_path / "c", made, seconds=3.0)
     run(SolveSettings(input=folder, out=tmp_path / "out.csv", groups=("clinical", "quality")))
     names = list(table.read(tmp_path / "out.csv").columns)
-    assert names == ["time", *COLUMNS[7:14], *(f"quality_{s}" for s in arm_segments("right"))]
+    told = [f"quality_{joint}_angles" for joint in ("shoulder", "elbow", "wrist")]
+    assert names == ["time", *COLUMNS[7:14], *told, *(f"quality_{s}" for s in arm_segments("right"))]
+
+
+@pytest.mark.parametrize("ending", ["csv", "parquet"])
+@pytest.mark.parametrize("mode", ["live", "best"])
+def test_what_one_sensor_leaves_to_an_assumption_is_marked_and_named(made, tmp_path, ending, mode) -> None:
+    folder = capture_folder(tmp_path / "c", made, toml=f"facing_deg = 0\n{POSE}", seconds=5.0)
+    for segment in ("upper_arm_r", "hand_r"):
+        (folder / f"{segment}.csv").unlink()
+    out = tmp_path / f"out.{ending}"
+    report = run(SolveSettings(input=folder, out=out, rate_hz=20.0, mode=mode))
+    found = table.read(out)
+    there = np.isfinite(found.columns["elbow_flexion"])
+    assert there.sum() > 80
+    assert set(found.columns["quality_elbow_angles"][there]) == {"assumed"}
+    assert set(found.columns["quality_elbow_angles"][~there]) <= {""}
+    assert set(found.columns["quality_wrist_position"][there]) == {"assumed"}
+    assert set(found.columns["quality_forearm_r"][there]) == {"good"}
+    assert "quality_shoulder_angles" not in found.columns
+    why = "the upper arm hangs still, the hand is in line with the forearm"
+    assert found.metadata["assumed"]["elbow_angles"] == report.assumptions["elbow_angles"] == why
+
+
+def test_two_sensors_assume_nothing_of_the_elbow(made, tmp_path) -> None:
+    folder = capture_folder(tmp_path / "c", made, toml=f"facing_deg = 0\n{POSE}", seconds=5.0)
+    (folder / "hand_r.csv").unlink()
+    report = run(SolveSettings(input=folder, out=tmp_path / "out.csv", rate_hz=20.0))
+    assert set(report.assumptions) == {"hand_position"}
+    found = table.read(tmp_path / "out.csv")
+    assert set(found.columns["quality_elbow_angles"]) - {""} == {"good"}
 
 
 def test_bad_input_is_one_line(tmp_path) -> None:

@@ -117,6 +117,9 @@ def _words(source: Path, report: "SolveReport") -> str:
     ]
     for segment, counts in report.quality.items():
         lines.append(f"  {segment}: " + ", ".join(f"{n} {quality}" for quality, n in counts.items()))
+    for why in dict.fromkeys(report.assumptions.values()):
+        names = [what.replace("_", " ") for what, text in report.assumptions.items() if text == why]
+        lines.append(f"assumed, not measured: {', '.join(names)}: {why}")
     if report.live_compared:
         lines.append(f"beside {report.live_compared} live skeletons: {_beside_live(report)}")
     lines += [f"not used: {count} ({reason})" for reason, count in report.drops.items()]
