@@ -4,7 +4,7 @@ A packet is 0x00, a time stamp of three bytes and two bytes a channel; it has no
 until what follows it begins as it must: another packet whose stamp is a whole number of samples later.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from brachium_nodes.shimmer.protocol import ACK, BATTERY_ANSWER, DATA, IN_STREAM, STATUS_ANSWER, battery_v
@@ -39,15 +39,11 @@ class PacketReader:
     resynchronised: int = 0
     """Times that the packets' beginnings were lost."""
     battery_v: float | None = None
-    _buffer: bytearray = None  # type: ignore[assignment]
+    _buffer: bytearray = field(default_factory=bytearray)
     _held: Packet | None = None
     _last: int | None = None
     _sure: bool = False
     _astray: int = 0
-
-    def __post_init__(self) -> None:
-        """Begin with nothing."""
-        self._buffer = bytearray()
 
     def feed(self, data: bytes, now_ns: int) -> list[Packet]:
         """Return the packets that are sure, in their order; `now_ns`: host time at which `data` was there."""
@@ -58,11 +54,8 @@ class PacketReader:
             if first == DATA:
                 if len(self._buffer) < _HEAD or not self._packet(found, now_ns):
                     break
-            elif first == ACK and self._sure:
-                self._release(found)
-                del self._buffer[0]
-            elif first == IN_STREAM and self._sure:
-                if not self._answer(found):
+            elif first in (ACK, IN_STREAM) and self._sure:
+                if not self._answer(found, int(first == ACK)):
                     break
             else:
                 self._astray_by_one()
@@ -90,20 +83,24 @@ class PacketReader:
         apart = ahead % self.period
         return ahead >= self.period - JITTER_TICKS and min(apart, self.period - apart) <= JITTER_TICKS
 
-    def _answer(self, found: list[Packet]) -> bool:
-        """Take an answer between packets; return whether anything was done."""
-        if len(self._buffer) < 2:
-            return False
-        length = _IN_STREAM_LENGTHS.get(self._buffer[1])
+    def _answer(self, found: list[Packet], begin: int) -> bool:
+        """Take an answer between packets, with its acknowledgement or not; return whether anything was done.
+
+        One byte alone would not tell it from a packet's rest.
+        """
+        head = self._buffer[begin : begin + 2]
+        length = _IN_STREAM_LENGTHS.get(head[1]) if len(head) == 2 and head[0] == IN_STREAM else None
         if length is None:
+            if len(head) < 2 and head in (b"", bytes([IN_STREAM])):
+                return False
             self._astray_by_one()
             return True
-        if len(self._buffer) < length:
+        if len(self._buffer) < begin + length:
             return False
-        if self._buffer[1] == BATTERY_ANSWER:
-            self.battery_v = battery_v(bytes(self._buffer[2:length]))
+        if head[1] == BATTERY_ANSWER:
+            self.battery_v = battery_v(bytes(self._buffer[begin + 2 : begin + length]))
         self._release(found)
-        del self._buffer[:length]
+        del self._buffer[: begin + length]
         return True
 
     def _release(self, found: list[Packet]) -> None:
