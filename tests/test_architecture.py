@@ -110,7 +110,7 @@ def test_every_module_is_reached_by_a_test():
     todo = set().union(*(imported(path) for path in (ROOT / "tests").rglob("*.py"))) & set(files)
     # Commands are tested by their names; the others are fetched by name, or run as programs.
     todo |= {name for name in files if name.startswith("brachium.commands.")}
-    todo |= {"brachium.client", "brachium.bench_relay", "brachium.bench_crowd"}
+    todo |= {"brachium.client", "brachium.bench_relay", "brachium.bench_crowd", "brachium.bench_echo"}
     reached: set[str] = set()
     while todo:
         name = todo.pop()

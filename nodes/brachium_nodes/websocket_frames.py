@@ -6,7 +6,13 @@ A gateway reads thousands of small frames a second; this does no more for each t
 from struct import pack, unpack_from
 from typing import NamedTuple
 
-from websockets.frames import apply_mask as masked
+try:
+    from websockets.speedups import apply_mask
+except ImportError:  # built without its compiled part
+    from websockets.utils import apply_mask
+
+masked = apply_mask
+"""Masks bytes, or unmasks them, with a key of 4."""
 
 TEXT, BINARY, CLOSE, PING, PONG = 1, 2, 8, 9, 10
 PROTOCOL_ERROR, BAD_TEXT, TOO_BIG = 1002, 1007, 1009

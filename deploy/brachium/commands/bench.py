@@ -1,6 +1,9 @@
 """Measure this machine: what one arm costs, how late its skeletons are, what a hundred arms cost.
 
 brachium bench --quick
+  brachium bench --gateway
+  brachium bench --clock --runs 200 --json
+  brachium bench --hostile 1000000 --json
 """
 
 import argparse
@@ -20,16 +23,53 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--arms", type=whole(0, 10_000), default=100, help="how many arms are many; 0 leaves them out"
     )
+    other = parser.add_mutually_exclusive_group()
+    other.add_argument("--gateway", action="store_true", help="instead: what many nodes cost the gateway")
+    other.add_argument("--clock", action="store_true", help="instead: how well nodes' clocks are known")
+    other.add_argument(
+        "--hostile", type=whole(1, 100_000_000), metavar="FRAMES", help="instead: a gateway under attack"
+    )
+    parser.add_argument("--nodes", type=whole(1, 500), default=256, help="of --gateway")
+    parser.add_argument("--runs", type=whole(1, 10_000), default=200, help="of --clock")
     add_json(parser)
 
 
 def run(args: argparse.Namespace) -> int:
     """Measure, one network after the other."""
+    if args.gateway or args.clock or args.hostile is not None:
+        return _other(args)
     figures = measure(QUICK_WINDOW_S if args.quick else WINDOW_S, args.arms)
     if args.json:
         print_json(figures)
     else:
         print(text(figures))
+    return 0
+
+
+def _other(args: argparse.Namespace) -> int:
+    """Measure one part alone; its figures are few enough to be told by name."""
+    found: Any
+    if args.gateway:
+        from brachium import bench_gateway
+
+        found = bench_gateway.measure(args.nodes, QUICK_WINDOW_S if args.quick else WINDOW_S)
+    elif args.clock:
+        from brachium import bench_clock
+
+        found = bench_clock.measure(args.runs)
+    else:
+        from brachium import bench_hostile
+
+        found = bench_hostile.measure(args.hostile)
+    if args.json:
+        print_json(found)
+        return 0
+    for name, value in asdict(found).items():
+        print(
+            f"{name.replace('_', ' '):<32}{value:.4g}"
+            if isinstance(value, float)
+            else f"{name.replace('_', ' '):<32}{value}"
+        )
     return 0
 
 
