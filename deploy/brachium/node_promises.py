@@ -48,7 +48,70 @@ def _battery() -> Proof:
     )
 
 
+def _clock() -> Proof:
+    return Proof(
+        name="clock",
+        commands=(("bench", "--clock", "--runs", "200", "--json"),),
+        promises=(
+            figure("error after 5 s, median", "ms", "median_ms_5s"),
+            figure("error after 5 s, 95 %", "ms", "p95_ms_5s", at_most=0.7),
+            figure("error after 60 s, median", "ms", "median_ms_60s", at_most=0.1),
+            figure("error after 60 s, 95 %", "ms", "p95_ms_60s", at_most=0.5),
+            figure("the first message's offset, after 60 s, 95 %", "ms", "first_message_p95_ms_60s"),
+            Promise(
+                name="batches beyond the stated uncertainty",
+                unit="1",
+                take=lambda f: 1.0 - float(f["covered"]),
+                at_most=0.05,
+            ),
+            figure("uncertainty stated, median", "ms", "stated_median_ms"),
+            figure("times that go back", "1", "backwards", at_most=0),
+        ),
+    )
+
+
+def _gateway() -> Proof:
+    return Proof(
+        name="gateway",
+        commands=(("bench", "--gateway", "--nodes", "256", "--json"),),
+        promises=(
+            figure("256 nodes: gateway, of a core", "1", "gateway_cpu", at_most=0.20),
+            figure("256 nodes: a bare echo, of a core", "1", "echo_cpu"),
+            figure("256 nodes: samples lost", "samples", "samples_lost", at_most=0),
+            Promise(
+                name="256 nodes: samples not counted",
+                unit="samples",
+                take=lambda f: abs(f["samples_sent"] - f["samples_received"]),
+                at_most=0,
+            ),
+        ),
+    )
+
+
+def _hostile() -> Proof:
+    return Proof(
+        name="gateway-hostile",
+        commands=(("bench", "--hostile", "1000000", "--json"),),
+        promises=(
+            figure("hostile frames", "1", "frames"),
+            Promise(name="gateways that ended", unit="1", take=lambda f: not f["gateway_alive"], at_most=0),
+            figure("memory grown by", "MB", "rss_growth_mb", at_most=10),
+            figure("good nodes: samples lost", "samples", "good_lost", at_most=0),
+            Promise(
+                name="good nodes: frames dropped",
+                unit="1",
+                take=lambda f: sum(f["good_drops"].values()),
+                at_most=0,
+            ),
+            figure("good nodes: samples received", "samples", "good_received"),
+        ),
+    )
+
+
 NODE_PROOFS: tuple[Proof, ...] = (
     *(_firmware(run, rate_hz) for run in ("quiet", "faults") for rate_hz in (50, 100)),
     _battery(),
+    _clock(),
+    _gateway(),
+    _hostile(),
 )
