@@ -25,26 +25,35 @@ class _Wanted(msgspec.Struct):
     mounting: Quaternion | None = None
 
 
-def serve_assign(bus: Bus, room: str, loop: asyncio.AbstractEventLoop, assign: Assign) -> None:
-    """Answer the command for every subject; `assign` runs on `loop`, questions come on Zenoh's threads."""
+def serve_assign(
+    bus: Bus, room: str, loop: asyncio.AbstractEventLoop, mine: Callable[[str], bool], assign: Assign
+) -> None:
+    """Answer the command for every subject; `assign` runs on `loop`, questions come on Zenoh's threads.
 
-    def answer(key: str, question: bytes) -> bytes:
-        done: Future[Answer] = Future()
+    A node that is not `mine` is left to the service whose it is.
+    """
+
+    def asked(key: str, question: bytes, reply: Callable[[bytes], None]) -> None:
         try:
-            loop.call_soon_threadsafe(lambda: done.set_result(_answer(key, question, assign)))
-            return encode(done.result(timeout=ANSWER_WITHIN_S))
+            command = decode(question, Command, TOPICS["command"].max_bytes)
+            wanted = msgspec.convert(command.arguments, _Wanted)
+            subject = keys.parse(key).subject
+        except (keys.BadKey, WireError, msgspec.ValidationError) as error:
+            text = f"assign takes id, segment and perhaps mounting: {error}"
+            reply(encode(Answer(ok=False, reason=text)))
+            return
+        if mine(wanted.id):
+            reply(encode(_done(wanted, subject)))
+
+    def _done(wanted: _Wanted, subject: str) -> Answer:
+        done: Future[str] = Future()
+        try:
+            loop.call_soon_threadsafe(
+                lambda: done.set_result(assign(wanted.id, subject, wanted.segment, wanted.mounting))
+            )
+            reason = done.result(timeout=ANSWER_WITHIN_S)
         except (RuntimeError, NoAnswer):  # the loop is closed, or just stopped
-            return encode(Answer(ok=False, reason="the gateway is ending"))
+            reason = "the gateway is ending"
+        return Answer(ok=not reason, reason=reason)
 
-    bus.serve(keys.commands(room, "assign"), answer)
-
-
-def _answer(key: str, question: bytes, assign: Assign) -> Answer:
-    try:
-        subject = keys.parse(key).subject
-        command = decode(question, Command, TOPICS["command"].max_bytes)
-        wanted = msgspec.convert(command.arguments, _Wanted)
-    except (keys.BadKey, WireError, msgspec.ValidationError) as error:
-        return Answer(ok=False, reason=f"assign takes id, segment and perhaps mounting: {error}")
-    reason = assign(wanted.id, subject, wanted.segment, wanted.mounting)
-    return Answer(ok=not reason, reason=reason)
+    bus.serve_later(keys.commands(room, "assign"), asked)

@@ -23,7 +23,7 @@ from brachium_nodes.listening import CannotListen, listening_address, why_not
 from brachium_nodes.node_door import listening
 from brachium_nodes.node_frames import MAX_FRAME_BYTES, Hello
 from brachium_nodes.node_socket import House, NodeSocket
-from brachium_nodes.roster import Admission, NodeEntry, Refusal, Roster
+from brachium_nodes.roster import SLIMEVR, Admission, NodeEntry, Refusal, Roster
 from brachium_wire import keys
 from brachium_wire.bus import DEFAULT_ENDPOINT, Bus
 from brachium_wire.codec import encode
@@ -99,7 +99,9 @@ class Gateway:
             self._heart = Heart(self._bus, settings.room, "gateway", settings.id)
             self._heart.text = f"ws://{f'[{address}]' if ':' in address else address}:{port}{PATH}"
             tell_host_time(self._bus, settings.room, settings.id, self._clock.now_ns)
-            serve_assign(self._bus, settings.room, loop, self._assign)
+            serve_assign(
+                self._bus, settings.room, loop, lambda node: not node.startswith(SLIMEVR), self._assign
+            )
             log.info("gateway %s takes nodes at %s", settings.id, self._heart.text)
             self._beat(now=True)
             async with answer_seekers(

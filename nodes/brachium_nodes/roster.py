@@ -10,6 +10,8 @@ from brachium_nodes.sample_stream import Memory, SegmentMemory
 from brachium_wire import keys
 from brachium_wire.messages import Quaternion, SensorCalibration
 
+SLIMEVR = "slimevr-"
+"""With this begin the ids of SlimeVR trackers, which have a door of their own."""
 MAX_WAITING = 64
 """Unknown nodes that are remembered; more than a room holds are not a mistake but an attack."""
 

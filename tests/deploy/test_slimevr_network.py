@@ -305,3 +305,23 @@ def test_a_second_tracker_for_a_taken_segment_waits(tracker, room):
     }
     assert len(signs) == 1
     until(lambda: room.health().drops.get("no_segment", 0) >= 39, "the second one's samples to be dropped")
+
+
+def test_a_stranger_that_is_assigned_by_command_comes_in_beside_a_running_gateway(
+    tracker, room, network, processes, brachium
+):
+    endpoint, _ = network
+    processes.start("gateway", ["gateway", "--endpoint", endpoint, "--port", "0", "--discovery-port", "0"])
+    until(lambda: room.of("health", "gateway/gateway"), "the gateway")
+    one = tracker("0badc0ffee00", [0])
+    node = "slimevr-0badc0ffee00.0"
+    until(lambda: node in room.health().waiting, "the stranger to be shown")
+    done = brachium("gateway", "--endpoint", endpoint, "--assign", f"{node}=p03/upper_arm_l")
+    assert (done.returncode, done.stdout) == (0, f"{node} is now upper_arm_l of p03\n"), done.stderr
+    until(lambda: one.times("joined"), "the tracker to be answered")
+    until(lambda: one.times("acked"), "its sensor to be known")
+    one.play([{0: elbow(deg)} for deg in range(20)])
+    until(lambda: samples(room, "upper_arm_l"), "its samples")
+    until(lambda: node not in room.health().waiting, "the stranger to wait no more")
+    refused = brachium("gateway", "--endpoint", endpoint, "--assign", "slimevr-zz.0=p03/hand_l")
+    assert (refused.returncode, "no MAC address" in refused.stderr) == (1, True)

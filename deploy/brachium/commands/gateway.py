@@ -105,7 +105,10 @@ def _assign(args: argparse.Namespace) -> None:
         question = encode(Command(arguments={"id": node, "segment": segment}))
         reply = bus.ask(keys.command(args.room, subject, "assign"), question)
     if reply is None:
-        raise Failed(f"no gateway of room {args.room} answered; is it running?")
+        raise Failed(
+            f"nobody in room {args.room} answered for {node}: is its door running? "
+            "brachium gateway, or for trackers brachium slimevr"
+        )
     answer = decode(reply, Answer)
     if not answer.ok:
         raise Failed(answer.reason)

@@ -8,11 +8,11 @@ from brachium_body.lengths import from_height
 from brachium_body.segments import SEGMENTS
 from brachium_nodes.node_frames import MAX_RATE_HZ
 from brachium_nodes.places import place
+from brachium_nodes.roster import SLIMEVR
 from brachium_nodes.slimevr.positions import SEGMENT_AT
 from brachium_wire import keys
 from brachium_wire.messages import Quaternion
 
-NODE_PREFIX = "slimevr-"
 RATE_HZ = 100.0
 """At which the trackers' firmware bundles what it sends."""
 MAX_SENSORS = 16
@@ -56,14 +56,14 @@ def mac_digits(mac: str) -> str:
 
 def node_id(mac: str, sensor: int) -> str:
     """Return the node id of one sensor of a tracker; `mac` is twelve hex digits."""
-    return f"{NODE_PREFIX}{mac}.{sensor}"
+    return f"{SLIMEVR}{mac}.{sensor}"
 
 
 def from_node(node: str, subject: str, segment: str, mounting: Quaternion | None) -> Allowed:
     """Return what allows the sensor of this node id, or raise ValueError."""
-    mac, dot, sensor = node.removeprefix(NODE_PREFIX).partition(".")
-    if not node.startswith(NODE_PREFIX) or not dot or not re.fullmatch("[0-9]{1,2}", sensor):
-        raise ValueError(f"node {node[:80]!r} is no SlimeVR tracker; write {NODE_PREFIX}a1b2c3d4e5f6.0")
+    mac, dot, sensor = node.removeprefix(SLIMEVR).partition(".")
+    if not node.startswith(SLIMEVR) or not dot or not re.fullmatch("[0-9]{1,2}", sensor):
+        raise ValueError(f"node {node[:80]!r} is no SlimeVR tracker; write {SLIMEVR}a1b2c3d4e5f6.0")
     return Allowed(mac=mac, subject=subject, segment=segment, sensor=int(sensor), mounting=mounting)
 
 

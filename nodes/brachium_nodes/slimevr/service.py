@@ -10,7 +10,7 @@ from brachium_nodes.assign_command import serve_assign
 from brachium_nodes.discovery import broadcast_address
 from brachium_nodes.host_claim import HostClaims, checked_host
 from brachium_nodes.listening import CannotListen, listening_address, why_not
-from brachium_nodes.roster import Roster
+from brachium_nodes.roster import SLIMEVR, Roster
 from brachium_nodes.slimevr.actions import Action, Joined, Left, Publish, Send, Told
 from brachium_nodes.slimevr.allowed import Allowed, AllowList, from_node
 from brachium_nodes.slimevr.tracker import Address
@@ -84,7 +84,7 @@ class Service:
         self._heart = Heart(self._bus, settings.room, "slimevr", settings.id)
         self._heart.text = f"udp {address}:{port}"
         tell_host_time(self._bus, settings.room, settings.id, self._clock.now_ns)
-        serve_assign(self._bus, settings.room, loop, self._assign)
+        serve_assign(self._bus, settings.room, loop, lambda node: node.startswith(SLIMEVR), self._assign)
         log.info("SlimeVR trackers may come in at %s", self._heart.text)
         self._beat(now=True)
         try:
