@@ -11,6 +11,8 @@ from brachium_wire.messages import SensorCalibration
 
 MAG_RESIDUAL = 0.06
 """Part of the field, a robust SD: more means that iron or a magnet was near for much of the turning."""
+MOST_STEPS = 50
+"""Of the fit: a sound one takes about ten, one beside iron would take thousands and find nothing."""
 FIELD_LEAST, FIELD_MOST = 15.0, 90.0
 """uT: the Earth's field has 22 to 67, and a magnetometer's scale may be a quarter off."""
 END_LEAST, END_SHARE = 200.0, 0.05
@@ -60,7 +62,12 @@ def mag_ellipsoid(mag: Floats) -> SensorFit:
         return lengths
 
     found = least_squares(
-        residual, np.r_[offset, (matrix / field)[upper]], loss="soft_l1", f_scale=0.02, x_scale="jac"
+        residual,
+        np.r_[offset, (matrix / field)[upper]],
+        loss="soft_l1",
+        f_scale=0.02,
+        x_scale="jac",
+        max_nfev=MOST_STEPS,
     )
     offset = found.x[:3]
     whole = np.zeros((3, 3))

@@ -58,7 +58,7 @@ class CalibrationBench:
         for number, face in enumerate(FACES):
             up = (1.0 if face[0] == "+" else -1.0) * np.eye(3)["xyz".index(face[1])]
             off = rotation.from_rotation_vector(random_turn(error_deg, self._random("face", number)))
-            found[face] = self._still(f"face/{face}", rotation.multiply(off, _to_up(up)), seconds)
+            found[face] = self._still(f"face/{face}", rotation.multiply(off, to_up(up)), seconds)
         return found
 
     def still_poses(self, count: int = 16, seconds: float = 2.0) -> list[BenchReadings]:
@@ -68,13 +68,13 @@ class CalibrationBench:
         flat: Array = np.sqrt(1.0 - height**2)
         ups = np.stack([flat * np.cos(turn), flat * np.sin(turn), height], axis=-1)
         anyhow = rotation.about(2, random.uniform(0.0, 2.0 * pi, count))
-        poses = rotation.multiply(anyhow, np.stack([_to_up(up) for up in ups]))
+        poses = rotation.multiply(anyhow, np.stack([to_up(up) for up in ups]))
         return [self._still(f"pose/{number}", pose, seconds) for number, pose in enumerate(poses)]
 
     def turned_everywhere(self, seconds: float = 60.0) -> BenchReadings:
         """Return readings while the chip is turned slowly in every direction: for the magnetometer."""
         t = np.arange(round(seconds * self.settings.rate_hz)) / self.settings.rate_hz
-        return self._read("turns", *(_turning(t + step) for step in (-_STEP_S, 0.0, _STEP_S)))
+        return self._read("turns", *(turning(t + step) for step in (-_STEP_S, 0.0, _STEP_S)))
 
     def perfect_calibration(self) -> SensorCalibration:
         """Return the calibration that leaves no error of bias, scale or iron: what a fit is judged by.
@@ -115,13 +115,13 @@ class CalibrationBench:
 _STEP_S = 0.001
 
 
-def _turning(t: Array) -> Array:
+def turning(t: Array) -> Array:
     """Return world_from_sensor (n, 4) of a chip that is turned by hand about three axes at once."""
     turns = [rotation.about(axis, 2.0 * pi * hz * t) for axis, hz in ((2, 0.11), (0, 0.071), (1, 0.29))]
     return rotation.multiply(rotation.multiply(turns[0], turns[1]), turns[2])
 
 
-def _to_up(up: Array) -> Array:
+def to_up(up: Array) -> Array:
     """Return a world_from_sensor (4,) that turns the direction `up` (3,) of sensor axes to the world's up."""
     axis, cosine = np.cross(up, _UP), float(up @ _UP)
     if np.linalg.norm(axis) < 1e-9:

@@ -7,10 +7,12 @@ import secrets
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from math import ceil, inf
+from pathlib import Path
 from threading import Event
 
 from brachium_body.segments import Side
 from brachium_nodes.direct_node import DirectHost, DirectSink
+from brachium_nodes.emulated_flash import with_flash
 from brachium_nodes.emulated_nodes import alike, node_id, node_streams
 from brachium_nodes.firmware_wearer import FirmwareWearer
 from brachium_nodes.gateway import token_sha256
@@ -66,6 +68,8 @@ class EmulateSettings:
     session: bool = True
     shimmer: ShimmerTwin | None = None
     """A Shimmer3 beside the first node; brachium shimmer makes it `<subject>.ref`."""
+    flash: Path | None = None
+    """Folder in which the nodes keep what they must not forget when they are switched off."""
 
     def __post_init__(self) -> None:
         """Raise ValueError for what cannot be emulated."""
@@ -174,7 +178,7 @@ class _Emulation:
     async def _send(self, end_s: float) -> dict[tuple[str, str], StreamCount]:
         settings, boot = self._settings, secrets.randbits(32)
         streams = [
-            stream
+            with_flash(stream, settings.flash)
             for wearer, subjects in self._wearers
             for stream in alike(node_streams(subjects[0], wearer, settings.faults, boot), subjects)
         ]

@@ -1,6 +1,10 @@
 """Calibrate a person's sensors in a running network: it says what to do, and how it went.
 
+How they are worn, or, with --sensor, one sensor itself, before it is worn: bias, scale, iron. What is found
+of a sensor is kept on its node.
+
 brachium calibrate --subject p01 --routine guided
+  brachium calibrate --subject p01 --sensor forearm_r
 """
 
 import argparse
@@ -44,6 +48,13 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--seconds", type=real(1.0, 30.0), default=3.0, metavar="S", help="how long the pose is held"
     )
+    parser.add_argument("--sensor", metavar="SEGMENT", help="calibrate this segment's sensor itself")
+    parser.add_argument(
+        "--steps",
+        type=_steps,
+        metavar="A,B",
+        help="with --sensor: some of rest (gyroscope), faces (accelerometer), turn (magnetometer)",
+    )
     parser.add_argument("--zero", action="store_true", help="only set headings anew: let the arms hang still")
 
 
@@ -52,6 +63,8 @@ def run(args: argparse.Namespace) -> int:
     from brachium_wire import keys
     from brachium_wire.bus import Bus
 
+    if args.sensor is not None or args.steps is not None:
+        return _sensor(args)
     angles = _held(args)
     stop = stop_on_signals()
     with Bus.open(args.endpoint, stop=stop) as bus:
@@ -72,6 +85,21 @@ def run(args: argparse.Namespace) -> int:
     if not answer.ok:
         raise Failed(answer.reason)
     return 0
+
+
+def _sensor(args: argparse.Namespace) -> int:
+    from brachium.calibrate_sensor import SensorCalibrationRun
+    from brachium_body.segments import SEGMENTS
+    from brachium_wire.bus import Bus
+
+    if args.sensor not in SEGMENTS:
+        raise Usage(f"--sensor takes one of {', '.join(SEGMENTS)}; came {args.sensor!r}")
+    if args.zero or args.angle:
+        raise Usage("--sensor calibrates the sensor itself: no --zero and no --angle with it")
+    stop = stop_on_signals()
+    with Bus.open(args.endpoint, stop=stop) as bus:
+        one = SensorCalibrationRun(bus, args.room, args.subject, args.sensor, stop)
+        return one.run(args.steps, as_json=args.json)
 
 
 def _held(args: argparse.Namespace) -> dict[str, float]:
@@ -138,3 +166,10 @@ def _angle(text: str) -> tuple[str, float]:
     if not equals or not name:
         raise argparse.ArgumentTypeError(f"{text!r} cannot be used: write NAME=DEG, as in elbow_flexion=35")
     return name, real(-360.0, 360.0)(value)
+
+
+def _steps(text: str) -> list[str]:
+    steps = text.split(",")
+    if not set(steps) <= {"rest", "faces", "turn"}:
+        raise argparse.ArgumentTypeError(f"{text!r} cannot be used: some of rest,faces,turn")
+    return steps

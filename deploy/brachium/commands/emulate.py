@@ -2,6 +2,7 @@
 
 brachium emulate --exercise drinking --level typical --seconds 60
   brachium emulate --wearers 20 --seconds 60
+  brachium emulate --exercise sensor-calibration --gateway --token-file token.txt --flash flash
   brachium emulate --print-nodes --token-file token.txt >> site.toml
 """
 
@@ -44,13 +45,20 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--shimmer-delay", type=real(0.0, 1.0), default=0.02, metavar="S", help="from a sample to the port"
     )
+    parser.add_argument(
+        "--flash", type=Path, metavar="DIR", help="where the nodes keep their sensors' calibration"
+    )
     add_wearer(parser)
     add_faults(parser)
 
 
 def add_wearer(parser: argparse.ArgumentParser) -> None:
     """Add who moves, and with which sensors."""
-    parser.add_argument("--exercise", default="elbow-flexion", help="what is done; an unknown name lists all")
+    parser.add_argument(
+        "--exercise",
+        default="elbow-flexion",
+        help="what is done; an unknown name lists all; sensor-calibration: worn by nobody, to be calibrated",
+    )
     parser.add_argument("--routine", default="", help="what is done first; an unknown name lists all")
     parser.add_argument("--arms", default="right", help="right, left or both")
     parser.add_argument(
@@ -72,13 +80,17 @@ def add_faults(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Emulate, then tell what was sent."""
-    from brachium_nodes import emulate
+    from brachium_nodes import emulate, emulate_bench
 
     chosen = settings(args, read_token(args))
     if args.print_nodes:
         print(node_table(emulate.node_entries(chosen)))
         return 0
-    report = emulate.run(chosen, stop_on_signals())
+    mistake = emulate_bench.EXERCISES.get(args.exercise)
+    if mistake is None:
+        report = emulate.run(chosen, stop_on_signals())
+    else:
+        report = emulate_bench.run(chosen, mistake, stop_on_signals())
     if args.json:
         print_json(report)
         return 0
@@ -91,6 +103,7 @@ def run(args: argparse.Namespace) -> int:
 def settings(args: argparse.Namespace, token: str) -> "EmulateSettings":
     """Return what the options ask for; raises ValueError for what cannot be emulated."""
     from brachium_nodes.emulate import EmulateSettings
+    from brachium_nodes.emulate_bench import EXERCISES
     from brachium_nodes.link import FaultSettings
     from brachium_nodes.shimmer.emulated_port import ShimmerTwin
     from brachium_nodes.wearer import WearerSettings
@@ -108,8 +121,9 @@ def settings(args: argparse.Namespace, token: str) -> "EmulateSettings":
         wearers=args.wearers,
         alike=not args.different,
         shimmer=None if args.shimmer is None else ShimmerTwin(path=args.shimmer, delay_s=args.shimmer_delay),
+        flash=args.flash,
         wearer=WearerSettings(
-            exercise=args.exercise,
+            exercise="elbow-flexion" if args.exercise in EXERCISES else args.exercise,
             routine=args.routine,
             arms=args.arms,
             level=args.level,
