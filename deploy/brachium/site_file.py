@@ -157,7 +157,7 @@ def _check(site: Site) -> None:
         raise BadSite(str(error)) from None
     subjects = _once([subject.id for subject in site.subject], "subject")
     _once([node.id for node in site.node], "node")
-    worn = (*site.node, *site.tracker)
+    worn: tuple[Node | Tracker, ...] = (*site.node, *site.tracker)
     places = [f"{one.segment} of {one.subject}" for one in worn if one.segment is not None]
     _once(places, "sensor place")
     for tracker in site.tracker:

@@ -13,7 +13,7 @@ WHOLE = """
 id = "gym"
 bind = "192.0.2.7"
 ports = { router = 7001, gateway = 7002, web = 7003 }
-services = ["router", "gateway", "fuse", "record", "view"]
+services = ["router", "gateway", "slimevr", "fuse", "record", "view"]
 [[subject]]
 id = "p01"
 side = "left"
@@ -24,6 +24,11 @@ token_sha256 = "abababababababababababababababababababababababababababababababab
 subject = "p01"
 segment = "forearm_l"
 mounting = [1, 0, 0, 0]
+[[tracker]]
+mac = "a1:b2:c3:d4:e5:f6"
+sensor = 1
+subject = "p01"
+segment = "hand_l"
 """
 
 
@@ -50,6 +55,7 @@ def test_a_whole_site_becomes_its_services():
     assert all(words[words.index("--endpoint") + 1] == "tcp/192.0.2.7:7001" for words in others)
     assert found["router"][-2:] == ["--users", "/u"]
     assert "t" not in found["gateway"], "a token must not be seen in the list of processes"
+    assert found["slimevr"][-4:] == ["--bind", "192.0.2.7", "--site", "/x/gym.toml"]
     assert session(site.subject[0]).side == "left"
 
 
@@ -111,6 +117,21 @@ def test_two_nodes_for_one_place_are_refused():
     text = f'[room]\nid = "a"\n[[subject]]\nid = "p"\n{NODE}{place}{NODE.replace("n1", "n2")}{place}'
     with pytest.raises(BadSite, match="hand_r of p"):
         parse(text)
+
+
+@pytest.mark.parametrize(
+    ("tracker", "says"),
+    [
+        ('mac = "a1b2c3d4e5f6"\nsubject = "p01"\nsegment = "hand_l"', "is there twice"),
+        ('mac = "a1b2c3d4e5f6"\nsubject = "p02"\nsegment = "hand_l"', "which no [[subject]] has"),
+        ('mac = "a1b2c3d4e5f6"\nsubject = "p01"\nsegment = "elbow"', "elbow"),
+        ('mac = "a1b2c3d4e5f6"\nsubjekt = "p01"', "did you mean 'subject'"),
+    ],
+)
+def test_a_tracker_that_cannot_be_is_refused_by_name(tracker: str, says: str):
+    with pytest.raises(BadSite) as told:
+        parse(f"{WHOLE}[[tracker]]\n{tracker}\n")
+    assert says in str(told.value)
 
 
 def test_secrets_are_made_once_and_for_this_user_only(tmp_path: Path):

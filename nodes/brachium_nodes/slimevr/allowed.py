@@ -5,7 +5,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 from brachium_body.lengths import from_height
-from brachium_body.segments import SEGMENTS
+from brachium_body.segments import SEGMENTS, Segment
 from brachium_nodes.node_frames import MAX_RATE_HZ
 from brachium_nodes.places import place
 from brachium_nodes.roster import SLIMEVR
@@ -70,7 +70,7 @@ def from_node(node: str, subject: str, segment: str, mounting: Quaternion | None
 def usual_mounting(segment: str) -> Quaternion:
     """Return segment_from_sensor of a tracker worn in the usual place: its y up along the hanging limb, its z
     off the skin, as SlimeVR's own mounting has it."""
-    known = next(s for s in SEGMENTS if s == segment)
+    known: Segment = next(s for s in SEGMENTS if s == segment)
     return place(known, from_height(1.75)).mounting
 
 
