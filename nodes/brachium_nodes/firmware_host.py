@@ -40,7 +40,10 @@ class FirmwareNode:
 
     @classmethod
     def start(cls, folder: Path, made: Build, *, serial: int = subprocess.DEVNULL) -> "FirmwareNode":
-        """Switch on the node that was prepared in `folder`; it reads `serial`. Raises NoMicroPython."""
+        """Switch on the node that was prepared in `folder`. Raises NoMicroPython.
+
+        `serial`: a file descriptor of its serial line; without one, what it says is in `serial.txt`.
+        """
         words = [sys.executable, "-m", serve.__name__, str(folder)]
         words += [*micropython(), str(BOARD / "run.py"), str(made.board), str(made.firmware)]
         environment = {**os.environ, "PYTHONPATH": str(PACKAGES.parent)}
@@ -50,7 +53,7 @@ class FirmwareNode:
                 cwd=folder,
                 env=environment,
                 stdin=serial,
-                stdout=said,
+                stdout=said if serial == subprocess.DEVNULL else serial,
                 stderr=said,
                 start_new_session=True,
             )

@@ -73,7 +73,9 @@ class Worn:
         got = np.vstack(rows)
         middle = len(got) // 2
         shifts = np.flatnonzero((truth["inertial"][:, :3] == got[middle]).all(axis=1)) - sent[middle]
-        fits = [s for s in shifts if (truth["inertial"][np.maximum(sent + s, 0), :3] == got).all()]
+        fits = [
+            s for s in shifts if (truth["inertial"][np.clip(sent + s, 0, len(truth) - 1), :3] == got).all()
+        ]
         assert len(fits) == 1, f"{self.segment}: samples were mixed up, or the numbers are not theirs"
         return sent + fits[0]
 

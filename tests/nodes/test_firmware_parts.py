@@ -224,3 +224,21 @@ def test_what_is_left_out_of_a_configuration_is_filled_in(on_chip):
     kept = on_chip(lines, files={"brachium.json": {**GOOD, "i2c": {"scl": 9}}})
     assert kept["i2c"] == {"id": -1, "scl": 9, "sda": 4, "hz": 400000}
     assert (kept["rate_hz"], kept["gateway"]) == (50, "")
+
+
+def test_a_configuration_is_kept_whole_or_not_at_all(on_chip, tmp_path: Path):
+    lines = """
+import configuration
+def kept(said):
+    try:
+        configuration.save(said)
+        return "kept"
+    except ValueError as error:
+        return "refused"
+print(json.dumps([kept(said) for said in given]))
+"""
+    given = [{**GOOD, "id": ".n"}, {**GOOD, "token": "a\nb"}, {**GOOD, "gateway": "http://x"}, GOOD, {}]
+    given.append({**GOOD, "wifi": {"name": "x" * 33}})
+    assert on_chip(lines, given) == ["refused"] * 3 + ["kept"] + ["refused"] * 2
+    assert json.loads((tmp_path / "brachium.json").read_text()) == GOOD
+    assert not (tmp_path / "brachium.new").exists()

@@ -13,7 +13,7 @@ from statistics import median
 from tempfile import TemporaryDirectory
 
 from brachium.option_types import duration_s
-from brachium.shell import add_json, print_json, stop_on_signals
+from brachium.shell import Failed, Usage, add_json, print_json, stop_on_signals
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
@@ -23,10 +23,14 @@ def configure(parser: argparse.ArgumentParser) -> None:
     what.add_argument(
         "--run", choices=["quiet", "faults"], help="run it on this host, and count every sample"
     )
+    what.add_argument(
+        "--configure", type=Path, metavar="FILE", help="give a node this brachium.json over its serial line"
+    )
     what.add_argument("--runtime", action="store_true", help="how long a node runs on its cell")
     what.add_argument(
         "--discharge", action="store_true", help="empty emulated cells: does the warning come in time?"
     )
+    parser.add_argument("--serial", metavar="PORT", help="where that node is, as in /dev/ttyUSB0")
     parser.add_argument("--rate", type=int, choices=[50, 100], default=50, help="samples a second of --run")
     parser.add_argument("--seconds", type=duration_s, default=60.0, help="how long to run")
     parser.add_argument("--folder", type=Path, metavar="DIR", help="keep the run's logs here")
@@ -41,6 +45,8 @@ def run(args: argparse.Namespace) -> int:
         for path in flash_files(args.out):
             print(path)
         return 0
+    if args.configure is not None:
+        return _configure_node(args)
     if args.runtime:
         return _run_times(args)
     if args.folder is not None:
@@ -51,6 +57,23 @@ def run(args: argparse.Namespace) -> int:
 
 def _measure(args: argparse.Namespace, folder: Path) -> int:
     return _discharge(args, folder) if args.discharge else _run(args, folder)
+
+
+def _configure_node(args: argparse.Namespace) -> int:
+    from brachium_nodes.serial_setup import NotTold, open_serial, read_configuration, tell
+
+    if args.serial is None:
+        raise Usage("--configure needs --serial PORT, as in /dev/ttyUSB0")
+    try:
+        configuration = read_configuration(args.configure)
+    except NotTold as error:
+        raise Usage(str(error)) from None
+    try:
+        tell(open_serial(args.serial), configuration)
+    except NotTold as error:
+        raise Failed(str(error)) from None
+    print(f"the node at {args.serial} starts anew with {args.configure}")
+    return 0
 
 
 def _run_times(args: argparse.Namespace) -> int:

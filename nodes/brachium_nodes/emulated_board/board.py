@@ -98,6 +98,11 @@ class Board:
             case _:
                 raise BusError(ENODEV)
 
+    @property
+    def watched(self) -> bool:
+        """Return whether a watchdog runs."""
+        return self._fed_us is not None
+
     def note(self, peak: int, shim: int, size: int) -> None:
         """Take what the interpreter says of its memory as it ends."""
         counts = self.counts

@@ -26,10 +26,13 @@ def run(folder: Path, words: list[str]) -> int:
     settings, feed = read_board(folder)
     board = Board(settings=settings, feed=feed, clock=true_us, pause=pause_ms)
 
+    running: list[subprocess.Popen[bytes]] = []
+
     def stop(*_: object) -> None:
         board.stopped = True
+        if not board.watched:
+            running[-1].terminate()  # nothing is lost: it takes no samples
 
-    signal.signal(signal.SIGTERM, stop)
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the interpreter takes it: both are in one terminal
     told = [settings.ticks_ppm, settings.ticks_shift_us, settings.send_buffer, settings.web_port]
     code = 0
@@ -37,16 +40,17 @@ def run(folder: Path, words: list[str]) -> int:
         here, there = socket.socketpair()
         with here, there:
             line = [*words, str(there.fileno()), *map(str, told)]
-            process = subprocess.Popen(line, cwd=folder, pass_fds=[there.fileno()])
+            running.append(subprocess.Popen(line, cwd=folder, pass_fds=[there.fileno()]))
+            signal.signal(signal.SIGTERM, stop)
             there.close()
             again = serve(board, here)
-        code = _ended(process)
+        code = _ended(running[-1])
         if not again or board.stopped:
             break
         board.counts.restarts += 1
         board.reset()
     (folder / REPORT).write_text(json.dumps(asdict(board.report())), encoding="utf-8")
-    return code
+    return 0 if board.stopped and code == -signal.SIGTERM else code
 
 
 def serve(board: Board, line: socket.socket) -> bool:

@@ -1,8 +1,8 @@
 """The cell: its voltage, how long it will last, and when to stop before it is harmed.
 
-What is left is told from three things, and always on the cautious side: the voltage, by a curve that is typical of
-lithium-ion cells; how fast that has fallen since the node was switched on, for a cell may be old or cold and the
-current is only said; and, where the voltage is low, how steeply it falls now.
+What is left is told from three things, and on the cautious side: the voltage, by a curve that is typical of
+lithium-ion cells; how fast that has fallen since the node was switched on, for a cell may be old or cold and
+the current is only said; and, where the voltage is low, how steeply it falls now.
 """
 
 _CURVE = (0, 0, 125, 10, 200, 20, 253, 29, 289, 39, 315, 49, 335, 59, 350, 69, 370, 88, 390, 118, 425, 235)

@@ -1,8 +1,11 @@
 """What a node is told about itself: one JSON file on its flash."""
 
 import json
+import os
 
 FILE = "brachium.json"
+_NEW = "brachium.new"
+ASKED = "setup.now"  # a file that stands for: let me be told anew
 
 DEFAULTS = {
     "id": "",
@@ -28,21 +31,81 @@ DEFAULTS = {
 }
 
 
+def kept():
+    """Return what the file holds, {} when there is none or it is none of ours."""
+    try:
+        with open(FILE) as file:
+            said = json.load(file)
+        return said if isinstance(said, dict) else {}
+    except (OSError, ValueError):
+        return {}
+
+
 def load():
     """Return the configuration, what is left out filled in. Raises OSError or ValueError."""
     with open(FILE) as file:
-        said = json.load(file)
+        return checked(json.load(file))
+
+
+def save(said):
+    """Keep this configuration; a loss of power leaves the old or the new one. Raises ValueError, OSError."""
+    checked(said)
+    with open(_NEW, "w") as file:
+        json.dump(said, file)
+    os.rename(_NEW, FILE)
+
+
+def why_not():
+    """Return why this node must be told something first, or nothing; asked is asked once."""
+    try:
+        os.remove(ASKED)
+        return "as you wish"
+    except OSError:
+        pass
+    try:
+        load()
+    except OSError:
+        return "there is no %s yet" % FILE
+    except ValueError as error:
+        return str(error) or "%s is no JSON" % FILE
+    return ""
+
+
+def checked(said):
+    """Return a configuration, what is left out filled in. Raises ValueError."""
     if not isinstance(said, dict):
         raise ValueError(FILE + " must hold one JSON object")
     chosen = _merged(DEFAULTS, said, "")
     for name in ("id", "token"):
-        if not chosen[name]:
-            raise ValueError("%s: %r is missing" % (FILE, name))
+        _is_word(name, chosen[name])
+    if not _is_name(chosen["id"]):
+        raise ValueError("%s: 'id' takes letters, digits, _, - and ., at most 64" % FILE)
+    if chosen["gateway"]:
+        _is_word("gateway", chosen["gateway"])
+        if not chosen["gateway"].startswith("ws://") or " " in chosen["gateway"]:
+            raise ValueError("%s: 'gateway' is ws://address:port/node, or empty" % FILE)
+    wifi = chosen["wifi"]
+    if len(wifi["name"].encode()) > 32 or 0 < len(wifi["password"]) < 8 or len(wifi["password"]) > 63:
+        raise ValueError(FILE + ": a Wi-Fi's name has at most 32 bytes, its password 8 to 63 letters")
     if not 1 <= chosen["rate_hz"] <= 200 or not 1 <= chosen["batch"] <= 32:
         raise ValueError(FILE + ": rate_hz takes 1 to 200, batch 1 to 32")
     if not chosen["rate_hz"] * chosen["poll_ms"] <= 16000:
         raise ValueError(FILE + ": at most 16 samples may gather between two polls")
     return chosen
+
+
+def _is_word(name, text):
+    """Refuse what would break a line of the WebSocket's handshake, as no ASCII or a line's end would."""
+    if not text:
+        raise ValueError("%s: %r is missing" % (FILE, name))
+    if len(text) > 128 or not all(" " <= letter <= "~" for letter in text):
+        raise ValueError("%s: %r takes at most 128 plain letters" % (FILE, name))
+
+
+def _is_name(text):
+    others = text.replace("_", "").replace("-", "").replace(".", "")
+    plain = all(letter.isdigit() or letter.isalpha() for letter in others)
+    return plain and len(text) <= 64 and text[0] != "."
 
 
 def _merged(defaults, said, where):

@@ -4,13 +4,12 @@ import asyncio
 import binascii
 import gc
 import hashlib
-import json
 import os
 
+from keeping import calibration
 from web_socket import WebSocket
 
 FIRMWARE = "brachium 0.1"
-CALIBRATION = "calibration.json"  # looked at before each hello
 _WITHIN_S = 5
 _GUID = b"258EAFA5-E914-47DA-95CA-C5AB0DC85B11"
 
@@ -36,7 +35,7 @@ async def join(about, sensor, boot, writer):
         gc.collect()
         return link, await asyncio.wait_for(link.receive(), _WITHIN_S)
     except BaseException:
-        stream.close()
+        stream.s.close()  # a Stream's own close() does nothing
         raise
 
 
@@ -79,16 +78,6 @@ async def _handshake(reader, stream, host, port, path, token):
             agreed = value.strip() == expected
     if not agreed:
         raise OSError("no WebSocket answers there")
-
-
-def calibration():
-    """Return the calibration that is kept on the node, {} when there is none or it cannot be read."""
-    try:
-        with open(CALIBRATION) as file:
-            kept = json.load(file)
-        return kept if isinstance(kept, dict) else {}
-    except (OSError, ValueError):
-        return {}
 
 
 def _hello(writer, about, sensor, boot):

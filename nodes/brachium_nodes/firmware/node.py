@@ -26,9 +26,9 @@ class Refused(OSError):
 
 
 class Node:
-    """`sensor` fills `batches`; `feed` is called as long as all is well."""
+    """`sensor` fills `batches`; `feed` is called as long as all is well; `asked` tells whether to end."""
 
-    def __init__(self, configuration, sensor, batches, clock, battery, wifi, feed):
+    def __init__(self, configuration, sensor, batches, clock, battery, wifi, feed, asked):
         self._about = configuration
         self._sensor, self._batches, self._clock = sensor, batches, clock
         self._battery, self._wifi, self._feed = battery, wifi, feed
@@ -38,10 +38,11 @@ class Node:
         batches.wake = self._waiting.set
         self._link = self._failure = None
         self._heard = 0
-        self._empty = False
+        self._is_asked, self.asked = asked, False
+        self._ends = False
 
     async def run(self):
-        """Sample and send until the battery is empty."""
+        """Sample and send until the battery is empty or somebody asked for an end."""
         sampling = asyncio.create_task(self._sample())
         try:
             await self._keep_connected()
@@ -50,7 +51,7 @@ class Node:
 
     async def _sample(self):
         told = time.ticks_ms()
-        while not self._empty:
+        while True:  # to the last goodbye: whoever does not feed the watchdog is started anew
             await asyncio.sleep_ms(self._about["poll_ms"])
             self._sensor.poll(self._clock.now)
             self._feed()
@@ -58,12 +59,13 @@ class Node:
                 told = time.ticks_add(told, 1000)
                 self._sensor.clock.learn()
                 self._battery.measure()
-                self._empty = self._battery.empty()
+                self.asked = self.asked or self._is_asked()
+                self._ends = self.asked or self._battery.empty()
 
     async def _keep_connected(self):
         pause = _FIRST_PAUSE_MS
         longest = self._about["longest_pause_s"] * 1000
-        while not self._empty:
+        while not self._ends:
             began, wait = time.ticks_ms(), 0
             try:
                 await self._converse()
@@ -73,11 +75,14 @@ class Node:
             except (OSError, EOFError, ValueError, MemoryError, asyncio.TimeoutError) as error:
                 print("no connection:", repr(error))
             gc.collect()
-            if self._empty:
+            if self._ends:
                 return
             if time.ticks_diff(time.ticks_ms(), began) > _STEADY_MS:
                 pause = _FIRST_PAUSE_MS
-            await asyncio.sleep_ms(max(min(wait, longest), pause // 2 + random.randrange(pause)))
+            rest = max(min(wait, longest), pause // 2 + random.randrange(pause))
+            while rest > 0 and not self._ends:
+                await asyncio.sleep_ms(min(rest, _LOOK_MS))
+                rest -= _LOOK_MS
             pause = min(2 * pause, longest)
 
     async def _converse(self):
@@ -87,7 +92,7 @@ class Node:
 
         link, said = await joining.join(self._about, self._sensor, self._boot, self._writer)
         joining = None
-        for name in ("joining", "discovery"):
+        for name in ("joining", "discovery", "keeping"):
             sys.modules.pop(name, None)
         tasks = ()
         try:
@@ -99,7 +104,7 @@ class Node:
                 asyncio.create_task(self._until_it_fails(work, link))
                 for work in (self._send, self._receive, self._tell)
             ]
-            while self._failure is None and not self._empty:
+            while self._failure is None and not self._ends:
                 await asyncio.sleep_ms(_LOOK_MS)
                 if link.stuck_ms() > _STALLED_MS or self._silent_ms() > _STALLED_MS:
                     raise OSError("the gateway has fallen silent")
@@ -159,6 +164,13 @@ class Node:
             kind = said.get("m")
             if kind == "clock/1":
                 await link.send(self._clock_answer, said.get("id", 0), came)
+            elif kind == "keep/1":
+                import keeping
+
+                keeping.keep(said.get("cal", "{}"))
+                keeping = None
+                sys.modules.pop("keeping", None)
+                await link.send(_kept)
             elif kind == "refused/1":
                 raise Refused(said)
 
@@ -212,3 +224,7 @@ class Node:
     def _bye(self, writer):
         writer.begin(1, "bye/1")
         writer.whole("next", self._sensor.clock.number)
+
+
+def _kept(writer):
+    writer.begin(0, "kept/1")

@@ -76,7 +76,7 @@ class WebSocket:
 
     def close(self):
         """End the connection without a word."""
-        self._stream.close()
+        self._stream.s.close()  # a Stream's own close() does nothing
 
 
 def _copy(writer, data):

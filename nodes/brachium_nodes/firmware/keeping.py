@@ -1,0 +1,23 @@
+"""The sensor's calibration on the node's flash. Loaded when there is one, given back: memory is short."""
+
+import json
+import os
+
+FILE = "calibration.json"
+
+
+def calibration():
+    """Return the calibration that is kept on the node, {} when there is none or it cannot be read."""
+    try:
+        with open(FILE) as file:
+            kept = json.load(file)
+        return kept if isinstance(kept, dict) else {}
+    except (OSError, ValueError):
+        return {}
+
+
+def keep(text):
+    """Store the JSON text of a calibration, whole or not at all. Raises OSError."""
+    with open("calibration.new", "w") as file:
+        file.write(text)
+    os.rename("calibration.new", FILE)
