@@ -61,7 +61,7 @@ class KnownCalibrations:
                 return file.read(file.path_of(self._folder, node))
             except FileNotFoundError:
                 pass
-            except (file.CalibrationFileError, OSError) as error:
+            except (file.CalibrationFileError, keys.BadKey, OSError) as error:
                 log.warning("node %s goes uncalibrated: %s", node, error)
         return file.CalibrationFile(node=node)
 
