@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 from brachium_nodes.desk import OnDesk, circle, rectangle
+from brachium_nodes.irregular import Irregular
 from brachium_nodes.motions import Free, Keyframes, Motion, there_and_back
 
 
@@ -189,6 +190,28 @@ EXERCISES: dict[str, Exercise] = {
             name="shrugging-continuous",
             text="lift the shoulder by 8 cm and let it down every 2 s, without a rest",
             motion=there_and_back(_HANGING_LOOSE, {**_HANGING_LIFTED, **_LIFT}, 2.0, move=0.5, hold=0.0),
+        ),
+        Exercise(
+            name="elbow-irregular",
+            text="bend the elbow as people do: uneven, with pauses, and tries that give up",
+            motion=Irregular({"elbow_flexion": 5}, {"elbow_flexion": 95}),
+        ),
+        Exercise(
+            name="elbow-impaired",
+            text="the same with an elbow that begins at 10 to 45 deg, goes 6 to 20 deg, and trembles",
+            motion=Irregular({"elbow_flexion": 5}, {"elbow_flexion": 95}, impaired=True),
+        ),
+        Exercise(
+            name="shoulder-irregular",
+            text="raise the arm to the front as people do: uneven, with pauses, and tries that give up",
+            motion=Irregular({"shoulder_flexion": 5, "elbow_flexion": 5}, {"shoulder_flexion": 100}),
+        ),
+        Exercise(
+            name="shoulder-impaired",
+            text="the same with an arm that begins at 10 to 45 deg, goes 6 to 20 deg, and trembles",
+            motion=Irregular(
+                {"shoulder_flexion": 5, "elbow_flexion": 5}, {"shoulder_flexion": 100}, impaired=True
+            ),
         ),
         Exercise(name="free", text="daily movement at random, with pauses", motion=_FREE),
         Exercise(

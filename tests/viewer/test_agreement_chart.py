@@ -1,5 +1,6 @@
 """Bland-Altman figures are pictures of the right size with every number's panel."""
 
+import struct
 from pathlib import Path
 
 import numpy as np
@@ -23,6 +24,17 @@ def test_each_ending_gives_its_format(tmp_path: Path, ending: str, begins: bytes
     agreement_chart.draw(again, NUMBERS, ALL, UNITS)
     if ending != "pdf":
         assert again.read_bytes() == path.read_bytes()
+
+
+def test_a_picture_is_one_page_clinical_angles_first_and_names_what_found_no_room(tmp_path: Path) -> None:
+    many = {f"theta{i}": NUMBERS["elbow_flexion"] for i in range(20)} | NUMBERS
+    left_out = agreement_chart.draw(tmp_path / "a.png", many, ALL, UNITS)
+    assert len(left_out) == len(many) - agreement_chart.A_PAGE
+    assert "elbow_flexion" not in left_out
+    width, height = struct.unpack(">II", (tmp_path / "a.png").read_bytes()[16:24])
+    assert max(width, height) < 2000
+    assert agreement_chart.draw(tmp_path / "a.pdf", many, ALL, UNITS) == []
+    assert (tmp_path / "a.pdf").read_bytes().count(b"/Type /Page ") == 2
 
 
 def test_what_cannot_be_drawn_is_named(tmp_path: Path) -> None:

@@ -232,7 +232,7 @@ def test_files_and_the_settings_beside_a_truth(tmp_path: Path, ending: Literal["
     (tmp_path / "capture.toml").write_text(
         '[truth]\nmetric = "relative"\nmask = "movement"\nmax_lag_samples = 2\n'
     )
-    found = compare.compare(tmp_path / f"a.{ending}", tmp_path / "truth.parquet")
+    found, _ = compare.compare(tmp_path / f"a.{ending}", tmp_path / "truth.parquet")
     assert found.lag_s == pytest.approx(0.02)
     assert found.mask == "movement"
     assert found.rows == N - 101
@@ -270,7 +270,7 @@ def test_the_authors_metric_gives_the_filters_known_figure(
     table.write(
         tmp_path / "a.parquet", {"time": segment.t, **columns("forearm_r_sensor", out["quat9D"])}, {}, {}
     )
-    found = compare.compare(tmp_path / "a.parquet", DATA / name / "truth.parquet")
+    found, _ = compare.compare(tmp_path / "a.parquet", DATA / name / "truth.parquet")
     assert found.mask == "movement"
     print(name, found.orientations["forearm_r_sensor"].total)
     assert found.orientations["forearm_r_sensor"].total.rmse == pytest.approx(published, abs=0.02)
@@ -297,7 +297,7 @@ def test_relative_orientations_give_the_filters_known_figure(
             **columns(f"{segment}_sensor", VQF(1.0 / data.rate_hz).updateBatch(*blocks)["quat6D"]),
         }
     table.write(tmp_path / "a.parquet", made, {}, {})
-    found = compare.compare(tmp_path / "a.parquet", DATA / name / "truth.parquet")
+    found, _ = compare.compare(tmp_path / "a.parquet", DATA / name / "truth.parquet")
     error = found.relative["forearm_r_sensor from upper_arm_r_sensor"]
     print(name, found.lag_s, error)
     assert error.rmse == pytest.approx(published, abs=0.1)

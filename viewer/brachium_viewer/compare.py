@@ -6,11 +6,10 @@ from typing import Any, Literal
 
 import numpy as np
 
-from brachium_viewer import agreement_chart
 from brachium_viewer.agreement import Agreement, agreement
+from brachium_viewer.metrics.repetitions import Repetition, repetitions
 from brachium_viewer.one_frame import FRAMES, FrameName, Removed
 from brachium_viewer.pairing import Floats, Mask, Matched, OrientationFigures, Pair
-from brachium_viewer.repetitions import Repetition, repetitions
 from brachium_viewer.statistics import ErrorFigures, error_figures
 from brachium_wire import table
 from brachium_wire.capture_settings import read_settings
@@ -33,6 +32,8 @@ class CompareSettings:
     """The column of b that rises once a repetition; `auto`: the angle that moves most; `none`: no cutting."""
     mask: str = ""
     """A column of b, true where rows count."""
+    columns: tuple[str, ...] = ()
+    """Only these columns, and orientations by their stems; * stands for anything."""
     from_s: float | None = None
     """Only from this time on, in b's own time."""
     to_s: float | None = None
@@ -83,6 +84,9 @@ class Comparison:
     """The column that cut them; empty when there are fewer than three."""
     repetitions: list[Repetition] = field(default_factory=list)
     per_repetition: dict[str, PerRepetition] = field(default_factory=dict)
+    """Only over rows in which a number was measured."""
+    assumed: dict[str, dict[str, float]] = field(default_factory=dict)
+    """Of columns that are not measured throughout: the share of rows that rests on an assumption, by a and b."""
 
     def to_json(self) -> dict[str, Any]:
         """Return the same as maps, text and numbers."""
@@ -100,19 +104,14 @@ def settings_beside(reference: Path) -> CompareSettings:
     return CompareSettings(mask=truth.mask)
 
 
-def compare(
-    a: Path, b: Path, settings: CompareSettings | None = None, figure: Path | None = None
-) -> Comparison:
+def compare(a: Path, b: Path, settings: CompareSettings | None = None) -> tuple[Comparison, Matched]:
     """Compare two result files, CSV or Parquet; without settings as `settings_beside(b)` says.
 
-    `figure` is where Bland-Altman plots are drawn, by its ending. Raises table.TableError (or a capture
-    error) when a file is no table or nothing in them can be compared.
+    Return also the rows that it rests on. Raises table.TableError (or a capture error) when a file is no
+    table or nothing in them can be compared.
     """
     chosen = settings_beside(b) if settings is None else settings
-    found, rows = matched(table.read(a), table.read(b), chosen, names=(str(a), str(b)))
-    if figure is not None:
-        agreement_chart.draw(figure, rows.numbers, rows.counts, found.units)
-    return found
+    return matched(table.read(a), table.read(b), chosen, names=(str(a), str(b)))
 
 
 def compare_tables(
@@ -130,7 +129,7 @@ def matched(
         raise TableError(f"lag = {settings.lag}: expected seconds, a finite number, or the word estimate")
     if settings.frame not in FRAMES:
         raise TableError(f"frame = {settings.frame!r}: expected {', '.join(FRAMES)}")
-    pair = Pair(a, b, names, leave_out=settings.mask)
+    pair = Pair(a, b, names, leave_out=settings.mask, columns=settings.columns)
     counts = _counts(b, pair.b_time, settings, names[1])
     lag_s = pair.best_lag_s(counts, settings.max_lag_samples) if settings.lag == "estimate" else settings.lag
     rows, removed = pair.at(lag_s, counts).in_one_frame(settings.frame)
@@ -162,6 +161,7 @@ def matched(
         repetitions_of=cut_by,
         repetitions=cut,
         per_repetition=_per_repetition(rows, cut),
+        assumed=rows.assumed_shares(),
     )
     return found, rows
 
@@ -186,11 +186,8 @@ def _cut(rows: Matched, units: dict[str, str], chosen: str, name: str) -> tuple[
     if chosen == NONE:
         return "", []
     if chosen == AUTO:
-        angles = {
-            n: float(np.ptp(b[rows.counts][np.isfinite(b[rows.counts])]))
-            for n, (_, b) in rows.numbers.items()
-            if units[n] == "deg" and np.isfinite(b[rows.counts]).any()
-        }
+        known = {n: rows.measured(n)[1][rows.counts] for n in rows.numbers if units[n] == "deg"}
+        angles = {n: float(np.ptp(b[np.isfinite(b)])) for n, b in known.items() if np.isfinite(b).any()}
         if not angles:
             return "", []
         chosen = max(angles, key=angles.__getitem__)
@@ -206,7 +203,8 @@ def _cut(rows: Matched, units: dict[str, str], chosen: str, name: str) -> tuple[
 def _per_repetition(rows: Matched, cut: list[Repetition]) -> dict[str, PerRepetition]:
     inside = [rows.counts & (rows.time >= r.from_s) & (rows.time <= r.to_s) for r in cut]
     found = {}
-    for name, (a, b) in rows.numbers.items():
+    for name in rows.numbers:
+        a, b = rows.measured(name)
         known = [i & np.isfinite(a) & np.isfinite(b) for i in inside]
         parts = [(a[k], b[k]) for k in known if k.any()]
         if len(parts) < FEWEST:

@@ -9,6 +9,7 @@ from brachium.evaluation import (
     detection,
     long_run,
     recording_tables,
+    repetition_tables,
     sensor_sets,
     slip_tables,
     tsilomitrou_tables,
@@ -61,6 +62,8 @@ CATALOGUE: tuple[Entry, ...] = (
     Entry(name="zhou-lambda", shows="lambda of one wearer used on another", make=zhou_limits.lambda_transfer),
     Entry(name="zhou-places", shows="sensors worn in other places", make=zhou_limits.arrangements),
     Entry(name="detection", shows="the smallest movement that is seen", make=detection.detection),
+    Entry(name="repetitions", shows="200 sessions: repetitions counted, ranges of motion",
+          make=repetition_tables.repetitions),
     Entry(name="sensor-sets", shows="one, two and three sensors, right and left",
           make=sensor_sets.sensor_sets),
 )  # fmt: skip

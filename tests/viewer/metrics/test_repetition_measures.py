@@ -1,0 +1,149 @@
+"""The measures of movements whose numbers are known."""
+
+import numpy as np
+import pytest
+
+from brachium_viewer.exercises import EXERCISES
+from brachium_viewer.metrics.arm_motion import ArmMotion
+from brachium_viewer.metrics.repetition_measures import NAMES, count, repetition_measures
+from brachium_viewer.metrics.set_measures import FEW, loss_between, set_measures, values
+
+TIME = np.arange(0.0, 60.0, 0.02)
+
+
+def reaches(ways: list[float], base: float = 0.0, move_s: float = 1.5, hold_s: float = 1.0) -> np.ndarray:
+    """Return minimum-jerk repetitions every 5 s."""
+    angle = np.full_like(TIME, base)
+    for k, way in enumerate(ways):
+        for at, change in ((5 * k + 0.5, way), (5 * k + 0.5 + move_s + hold_s, -way)):
+            u = np.clip((TIME - at) / move_s, 0.0, 1.0)
+            angle += change * u**3 * (10 - 15 * u + 6 * u * u)
+    return angle
+
+
+def test_one_repetition_of_known_size(motion_of) -> None:
+    motion = motion_of(TIME, {"elbow_flexion": reaches([80.0] * 3, base=20.0)})
+    exercise = EXERCISES["elbow-flexion"]
+    found = [repetition_measures(motion, exercise, r, 90.0) for r in count(motion, exercise).repetitions]
+    assert len(found) == 3
+    for one in found:
+        numbers = {name: m.value for name, m in one.measures.items()}
+        assert list(numbers) == list(NAMES)
+        assert numbers["start"] == pytest.approx(20.0, abs=0.2)
+        assert numbers["peak"] == pytest.approx(100.0, abs=0.2)
+        assert numbers["range"] == pytest.approx(80.0, abs=0.3)
+        assert numbers["peak_speed"] == pytest.approx(1.875 * 80.0 / 1.5, rel=0.02)
+        assert 1.0 < numbers["hold_time"] < 2.0
+        assert numbers["sparc"] == pytest.approx(-1.45, abs=0.1)
+        assert 0.3 < numbers["time_to_goal"] < 1.2
+        assert numbers["shoulder_shift"] is None
+        assert numbers["trunk_lean"] is None
+
+
+def test_an_exercise_that_lowers_its_angle_counts_downwards(motion_of) -> None:
+    motion = motion_of(TIME, {"elbow_flexion": reaches([-60.0] * 4, base=90.0)})
+    found = set_measures(motion, EXERCISES["elbow-extension"], goal_deg=35.0)
+    assert len(found.repetitions) == 4
+    assert found.medians["start"].value == pytest.approx(90.0, abs=0.3)
+    assert found.medians["peak"].value == pytest.approx(30.0, abs=0.3)
+    assert found.medians["range"].value == pytest.approx(60.0, abs=0.5)
+    assert found.best_peak.value == pytest.approx(30.0, abs=0.5)
+    assert found.medians["time_to_goal"].value is not None
+    assert found.extension_deficit.value == pytest.approx(30.0, abs=0.5)
+
+
+def test_a_tremor_adds_nothing_to_the_range(motion_of) -> None:
+    angle = reaches([15.0] * 4, base=35.0) + 2.0 * np.sin(2 * np.pi * 5.0 * TIME)
+    found = set_measures(motion_of(TIME, {"elbow_flexion": angle}), EXERCISES["elbow-flexion"])
+    assert len(found.repetitions) == 4
+    assert values(found.repetitions, "range") == pytest.approx([15.0] * 4, abs=0.5)
+
+
+@pytest.mark.parametrize(("plane", "exercise", "is_withheld"), [
+    (0.0, "shoulder-abduction", False),
+    (40.0, "shoulder-abduction", True),
+    (40.0, "scapular-elevation", False),
+    (90.0, "shoulder-flexion", False),
+    (-90.0, "shoulder-extension", False),
+    (-90.0, "shoulder-flexion", True),
+])  # fmt: skip
+def test_an_elevation_counts_in_its_plane_only(
+    motion_of, plane: float, exercise: str, is_withheld: bool
+) -> None:
+    angles = {"isb_elevation": reaches([80.0] * 3), "isb_plane": np.full_like(TIME, plane)}
+    found = set_measures(motion_of(TIME, angles), EXERCISES[exercise])
+    assert len(found.repetitions) == 3
+    peak = found.medians["peak"]
+    assert (peak.value is None) == is_withheld
+    assert ("plane" in peak.withheld) == is_withheld
+
+
+def test_what_is_assumed_or_lost_is_withheld_with_its_reason(motion_of) -> None:
+    motion: ArmMotion = motion_of(TIME, {"elbow_flexion": reaches([80.0] * 3)})
+    words = motion.quality["elbow_flexion"]
+    words[(TIME > 5.9) & (TIME < 6.4)] = "held"
+    lost = set_measures(motion, EXERCISES["elbow-flexion"])
+    assert len(lost.repetitions) == 3
+    words[:] = "assumed"
+    assert set_measures(motion, EXERCISES["elbow-flexion"]).repetitions == ()
+    deficit = set_measures(motion, EXERCISES["elbow-flexion"]).extension_deficit
+    assert deficit.value is None
+    assert deficit.withheld
+
+
+def test_half_a_repetition_unseen_is_withheld(motion_of) -> None:
+    motion = motion_of(TIME, {"elbow_flexion": reaches([80.0] * 3, hold_s=2.0)})
+    motion.quality["elbow_flexion"][(TIME > 6.8) & (TIME < 9.0)] = "missing"
+    found = set_measures(motion, EXERCISES["elbow-flexion"])
+    assert len(found.repetitions) == 3
+    peak = found.repetitions[1].measures["peak"]
+    assert peak.value is None
+    assert peak.coverage < 0.8
+    assert "sensor was not there" in peak.withheld
+
+
+def test_first_against_last(motion_of) -> None:
+    ways = [90.0] * FEW + [70.0] * FEW
+    found = set_measures(motion_of(TIME, {"elbow_flexion": reaches(ways)}), EXERCISES["elbow-flexion"])
+    assert found.first_to_last["range"].value == pytest.approx(-20.0, abs=0.5)
+    few = set_measures(motion_of(TIME, {"elbow_flexion": reaches(ways[:6])}), EXERCISES["elbow-flexion"])
+    assert few.first_to_last["range"].value is None
+    assert "fewer than 10" in few.first_to_last["range"].withheld
+
+
+def test_active_against_passive(motion_of) -> None:
+    exercise = EXERCISES["elbow-flexion"]
+    active, passive = (
+        set_measures(motion_of(TIME, {"elbow_flexion": reaches([way] * 3)}), exercise, mode=mode)
+        for way, mode in ((80.0, "active"), (95.0, "passive"))
+    )
+    assert loss_between(active, passive).value == pytest.approx(15.0, abs=0.5)
+
+
+def test_the_hands_way(motion_of) -> None:
+    angle = reaches([80.0] * 3)
+    straight = np.stack([0.3 * angle / 80.0, np.zeros_like(angle), np.zeros_like(angle)], axis=1)
+    turn = np.pi * angle / 80.0
+    round_way = 0.15 * np.stack([-np.cos(turn), np.sin(turn), np.zeros_like(turn)], axis=1)
+    exercise = EXERCISES["elbow-flexion"]
+    found = [
+        set_measures(motion_of(TIME, {"elbow_flexion": angle}, hand=h), exercise)
+        for h in (straight, round_way)
+    ]
+    assert found[0].medians["straightness"].value == pytest.approx(1.0, abs=0.01)
+    assert found[0].medians["hand_path"].value == pytest.approx(0.27, abs=0.02)
+    assert found[1].medians["straightness"].value < 0.75
+    assert found[1].medians["hand_path"].value > 0.35
+
+
+def test_the_shoulder_is_named_by_what_is_worn(motion_of) -> None:
+    shift = np.zeros((len(TIME), 3))
+    shift[:, 2] = reaches([0.05] * 3)
+    angles = {"elbow_flexion": reaches([80.0] * 3)}
+    alone = set_measures(motion_of(TIME, angles, shift=shift), EXERCISES["elbow-flexion"])
+    assert alone.medians["shoulder_shift"].value == pytest.approx(0.045, abs=0.006)
+    assert alone.shoulder_word == "shoulder or trunk movement"
+    lean = {**angles, "trunk_flexion": reaches([12.0] * 3)}
+    both = set_measures(motion_of(TIME, lean, shift=shift, with_sternum=True), EXERCISES["elbow-flexion"])
+    assert both.shoulder_word == "shoulder"
+    assert both.medians["trunk_lean"].value == pytest.approx(11.0, abs=1.5)

@@ -1,0 +1,61 @@
+"""Two arms against each other, and how the joints of one move together. Pure."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from brachium_body.angles import CLINICAL
+from brachium_viewer.metrics.arm_motion import ArmMotion, Floats
+from brachium_viewer.metrics.measure import ENOUGH, Measure, measure, withheld
+
+
+def symmetry(affected: Measure, other: Measure) -> Measure:
+    """Return one arm's measure over the other's, per cent: 100 is alike."""
+    if affected.value is None or other.value is None:
+        return withheld("one side is not known", "%")
+    if abs(other.value) < 1e-9:
+        return withheld("the other side did not move", "%")
+    return measure(100.0 * affected.value / other.value, "%")
+
+
+def asymmetry(one: Measure, other: Measure) -> Measure:
+    """Return the difference of two measures of jerk or the like over their mean, per cent: 0 is alike."""
+    if one.value is None or other.value is None:
+        return withheld("one side is not known", "%")
+    middle = 0.5 * (abs(one.value) + abs(other.value))
+    if middle < 1e-9:
+        return withheld("neither side moved", "%")
+    return measure(100.0 * (one.value - other.value) / middle, "%")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Components:
+    """Principal components of the clinical joint angles, largest first."""
+
+    names: tuple[str, ...]
+    """The angles that were measured, k."""
+    explained: Floats
+    """(k,) part of the variance, summing to 1."""
+    directions: Floats
+    """(k, k): row i is component i, unit length, over `names`; its largest entry is positive."""
+
+
+def components(motion: ArmMotion) -> Components | None:
+    """Return the principal components, or None when fewer than two angles were measured or nothing moved."""
+    columns = {name: motion.known(name) for name in CLINICAL}
+    names = tuple(n for n, v in columns.items() if len(v) and np.isfinite(v).mean() >= ENOUGH)
+    if len(names) < 2:
+        return None
+    table = np.stack([columns[name] for name in names], axis=1)
+    table = table[np.isfinite(table).all(axis=1)]
+    if len(table) < 2 * len(names):
+        return None
+    _, spread, directions = np.linalg.svd(table - table.mean(axis=0), full_matrices=False)
+    if spread[0] < 1e-9:
+        return None
+    largest = directions[np.arange(len(names)), np.abs(directions).argmax(axis=1)]
+    return Components(
+        names=names,
+        explained=spread**2 / np.sum(spread**2),
+        directions=directions * np.sign(largest)[:, None],
+    )

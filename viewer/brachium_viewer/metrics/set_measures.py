@@ -1,0 +1,119 @@
+"""What is measured of a whole set of an exercise: counts, medians, change within the set. Pure."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from brachium_viewer.exercises import Exercise
+from brachium_viewer.metrics import kinematics
+from brachium_viewer.metrics.arm_motion import ArmMotion
+from brachium_viewer.metrics.measure import Measure, measure, withheld
+from brachium_viewer.metrics.repetition_measures import (
+    NAMES,
+    RepetitionMeasures,
+    count,
+    repetition_measures,
+    rising,
+)
+
+FEW = 5
+"""First against last so many repetitions."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class SetMeasures:
+    """One set of one exercise by one arm."""
+
+    exercise: str
+    side: str
+    mode: str
+    """active, assisted or passive."""
+    goal_deg: float | None
+    from_s: float
+    to_s: float
+    tries: int
+    """Movements that went less than half the way: not repetitions."""
+    repetitions: tuple[RepetitionMeasures, ...]
+    medians: dict[str, Measure]
+    """Of the repetitions, by NAMES."""
+    best_peak: Measure
+    """The farthest that the angle went in a repetition."""
+    first_to_last: dict[str, Measure]
+    """Median of the last FEW repetitions minus that of the first FEW, by NAMES."""
+    extension_deficit: Measure
+    """By how much the elbow stayed short of straight, deg; 0 when it went straight."""
+    shoulder_word: str
+    """What a shift of the shoulder may be: `shoulder` alone, or `shoulder or trunk movement`."""
+
+
+def set_measures(
+    motion: ArmMotion,
+    exercise: Exercise,
+    *,
+    goal_deg: float | None = None,
+    mode: str = "active",
+) -> SetMeasures:
+    """Return the measures of a set; the motion is of the set alone."""
+    done = count(motion, exercise)
+    found = tuple(repetition_measures(motion, exercise, one, goal_deg) for one in done.repetitions)
+    return SetMeasures(
+        exercise=exercise.name,
+        side=motion.side,
+        mode=mode,
+        goal_deg=goal_deg,
+        from_s=float(motion.time_s[0]) if len(motion.time_s) else 0.0,
+        to_s=float(motion.time_s[-1]) if len(motion.time_s) else 0.0,
+        tries=len(done.tries),
+        repetitions=found,
+        medians={name: _median(found, name) for name in NAMES},
+        best_peak=_best(found, rises=exercise.rises),
+        first_to_last={name: _change(found, name) for name in NAMES},
+        extension_deficit=_deficit(motion),
+        shoulder_word="shoulder" if motion.with_sternum else "shoulder or trunk movement",
+    )
+
+
+def values(found: tuple[RepetitionMeasures, ...], name: str) -> list[float]:
+    """Return the values of one measure, of the repetitions that have it."""
+    return [m.value for one in found if (m := one.measures[name]).value is not None]
+
+
+def _median(found: tuple[RepetitionMeasures, ...], name: str) -> Measure:
+    known = values(found, name)
+    if not known:
+        reasons = [one.measures[name].withheld for one in found]
+        return withheld(max(reasons, key=reasons.count) if reasons else "no repetition", NAMES[name])
+    return measure(float(np.median(known)), NAMES[name])
+
+
+def _best(found: tuple[RepetitionMeasures, ...], *, rises: bool) -> Measure:
+    known = values(found, "peak")
+    if not known:
+        return _median(found, "peak")
+    return measure(max(known) if rises else min(known), "deg")
+
+
+def _change(found: tuple[RepetitionMeasures, ...], name: str) -> Measure:
+    if len(found) < 2 * FEW:
+        return withheld(f"fewer than {2 * FEW} repetitions", NAMES[name])
+    first, last = values(found[:FEW], name), values(found[-FEW:], name)
+    if len(first) < FEW or len(last) < FEW:
+        return withheld("not known in all of them", NAMES[name])
+    return measure(float(np.median(last) - np.median(first)), NAMES[name])
+
+
+def _deficit(motion: ArmMotion) -> Measure:
+    known = motion.known("elbow_flexion")
+    coverage = float(np.isfinite(known).mean()) if len(known) else 0.0
+    low, _ = kinematics.extremes(motion.time_s, known)
+    return measure(max(0.0, low) if np.isfinite(low) else np.nan, "deg", coverage)
+
+
+def loss_between(active: SetMeasures, passive: SetMeasures) -> Measure:
+    """Return by how much less far the arm goes by itself than when it is moved, deg ("active lag")."""
+    if active.best_peak.value is None or passive.best_peak.value is None:
+        return withheld("one of both is not known", "deg")
+    return measure(abs(passive.best_peak.value - active.best_peak.value), "deg")
+
+
+__all__ = ["FEW", "SetMeasures", "loss_between", "rising", "set_measures", "values"]
