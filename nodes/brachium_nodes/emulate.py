@@ -21,7 +21,7 @@ from brachium_nodes.link import FaultSettings
 from brachium_nodes.node_stream import NodeStream, StreamCount, Timeline
 from brachium_nodes.roster import NodeEntry
 from brachium_nodes.sending import Sink, SocketSink, send_streams
-from brachium_nodes.shimmer.emulated_port import EmulatedPort, ShimmerTwin
+from brachium_nodes.shimmer.emulated_port import ShimmerTwin, worn
 from brachium_nodes.wearer import Wearer, WearerSettings
 from brachium_wire import keys
 from brachium_wire.bus import DEFAULT_ENDPOINT, Bus
@@ -81,7 +81,7 @@ class EmulateSettings:
             raise ValueError(
                 "firmware is worn by one wearer, through a gateway, and asks for the field itself"
             )
-        if self.shimmer is not None and (self.wearers != 1 or self.speed != 1.0):
+        if self.shimmer is not None and (self.wearers > 1 or self.speed != 1.0):
             raise ValueError("a Shimmer3 is worn by one wearer, in real time")
         if self.wearers < 1:
             raise ValueError(f"{self.wearers} wearers cannot be; give 1 or more")
@@ -154,7 +154,7 @@ class _Emulation:
             for subject in (*settings.subjects(), *twins):
                 self._bus.retain(keys.session(settings.room, subject), encode(session(settings.wearer)))
         end_s = inf if settings.seconds is None else settings.seconds
-        twin = asyncio.create_task(self._wear_shimmer())
+        twin = await worn(settings.shimmer, settings.wearer, self._timeline, self._stop)
         try:
             counts = await (self._wear_firmware(end_s) if settings.firmware else self._send(end_s))
         finally:
@@ -165,10 +165,6 @@ class _Emulation:
             self._heart.counts["samples"] += count.sent
         self._heart.beat(now=True)
         return EmulateReport(streams=report)
-
-    async def _wear_shimmer(self) -> None:
-        if (twin := self._settings.shimmer) is not None:
-            await EmulatedPort(twin, self._settings.wearer).serve(self._timeline, self._stop)
 
     async def _wear_firmware(self, end_s: float) -> dict[tuple[str, str], StreamCount]:
         settings, ((wearer, (subject,)),) = self._settings, self._wearers

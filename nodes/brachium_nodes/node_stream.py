@@ -73,6 +73,11 @@ class Timeline:
         self.start_ns = time.monotonic_ns()
 
     @property
+    def begun(self) -> bool:
+        """Whether source time 0 was set, and is over."""
+        return self._made_ns < self.start_ns <= time.monotonic_ns()
+
+    @property
     def lead_s(self) -> float:
         """Seconds that passed before source time 0."""
         return (self.start_ns - self._made_ns) * 1e-9 * self.speed

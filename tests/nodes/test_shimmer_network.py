@@ -32,6 +32,8 @@ def listening(bus, listener):
 def device(path, timeline, delay_s=0.02):
     """A device at `path` until the end of the block; then its port is gone, as out of reach."""
     stop = threading.Event()
+    if not timeline.begun:
+        timeline.start()
     port = EmulatedPort(ShimmerTwin(path=path, delay_s=delay_s, jitter_s=0.002), WEARER)
     thread = threading.Thread(target=lambda: asyncio.run(port.serve(timeline, stop)))
     thread.start()

@@ -1,6 +1,7 @@
 """An emulated Shimmer3 behind a pseudo-terminal, worn on a segment of an emulated person."""
 
 import asyncio
+import logging
 import os
 import pty
 import tty
@@ -16,10 +17,11 @@ from brachium_nodes.shimmer.emulated import EmulatedShimmer, Floats
 from brachium_nodes.wearer import Wearer, WearerSettings
 from brachium_nodes.wearing import Wearing
 
+log = logging.getLogger(__name__)
+
 RATE_HZ = 51.2
 LOOK_S = 0.004
-MAX_WAITING = 4096
-"""Bytes that the radio holds for a host that does not read; then packets are lost."""
+LISTEN_S = 15.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -61,6 +63,14 @@ class EmulatedPort:
         acc, gyr, mag = calibrated(self._calibration, made.acc, made.gyr, made.mag)
         return acc[0], gyr[0], mag[0]
 
+    async def listened_to(self, stop: Stop) -> bool:
+        """Wait until a host has started the device, at most LISTEN_S; return whether one has."""
+        for _ in range(round(LISTEN_S / LOOK_S)):
+            if self.device.streaming or stop.is_set():
+                break
+            await asyncio.sleep(LOOK_S)
+        return self.device.streaming
+
     async def serve(self, timeline: Timeline, stop: Stop) -> None:
         """Answer, and stream in real time from source time 0 on, until `stop` is set."""
         with _terminal(self._twin.path) as master:
@@ -73,8 +83,8 @@ class EmulatedPort:
                     _write(master, answer)
                 now_s = timeline.now_s()
                 first = round((now_s - self._clock.phase_s) / self._clock.period_s)
-                if not self.device.streaming:
-                    number, waiting = max(first, 0), []
+                if not self.device.streaming or not timeline.begun:
+                    number, waiting = max(first, 0) if timeline.begun else 0, []
                     continue
                 while (taken_s := self._clock.phase_s + number * self._clock.period_s) <= now_s:
                     ticks = int(32768.0 * (self._clock.start_s + taken_s * (1.0 + self._clock.skew)))
@@ -85,6 +95,27 @@ class EmulatedPort:
                 while waiting and waiting[0][0] <= now_s:
                     arrived = _write(master, waiting.pop(0)[1])
                     self.sent, self.lost = self.sent + arrived, self.lost + (not arrived)
+
+
+async def worn(
+    twin: ShimmerTwin | None, settings: WearerSettings, timeline: Timeline, stop: Stop
+) -> asyncio.Future[None]:
+    """Put the device on, wait a while for somebody to listen to it, and return what serves it: to cancel.
+
+    Raises OSError when the port cannot be made.
+    """
+    if twin is None:
+        return asyncio.Future()
+    port = EmulatedPort(twin, settings)
+    serving = asyncio.create_task(port.serve(timeline, stop))
+    listening = asyncio.create_task(port.listened_to(stop))
+    await asyncio.wait({serving, listening}, return_when=asyncio.FIRST_COMPLETED)
+    if not listening.done():
+        listening.cancel()
+        serving.result()
+    elif not listening.result():
+        log.warning("nobody listens at %s: brachium shimmer would", twin.path)
+    return serving
 
 
 def _read(master: int) -> bytes:

@@ -4,6 +4,7 @@ import logging
 import secrets
 import threading
 from dataclasses import dataclass, field
+from pathlib import Path
 
 from brachium_body.segments import Segment
 from brachium_nodes.batch_blocks import measure
@@ -99,11 +100,17 @@ class ShimmerService:
                 if reason != said:
                     log.warning("%s", reason)
                 said = self._heart.text = reason
-            for _ in range(round(pause_s / LOOK_S)):
-                if not stop.wait(LOOK_S):
-                    self._heart.beat()
+            self._pause(pause_s, stop)
             pause_s = min(2.0 * pause_s, LONGEST_PAUSE_S)
         self._heart.beat(now=True)
+
+    def _pause(self, seconds: float, stop: threading.Event) -> None:
+        """Wait; a port that was away and is there again ends the wait."""
+        away = not Path(self._settings.port).exists()
+        for _ in range(round(seconds / LOOK_S)):
+            if stop.wait(LOOK_S) or (away and Path(self._settings.port).exists()):
+                return
+            self._heart.beat()
 
     def _claim(self) -> None:
         settings = self._settings
