@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from brachium_body.angles import CLINICAL
 from brachium_viewer.agreement import Agreement, agreement
 from brachium_viewer.charts import INK, MEASURED, QUIET
 from brachium_viewer.one_frame import Mask, Pairs
@@ -15,19 +16,23 @@ ENDINGS = (".svg", ".png", ".pdf")
 POINTS = 4000
 """Dots of a panel at most, evenly chosen; its lines rest on all of them."""
 ACROSS = 3
+A_PAGE = 12
+"""Panels that are still read at a glance, and fit on a screen."""
 LABELLED = {"deg": "deg", "m": "mm"}
 SCALE = {"m": 1e3}
 
 
-def draw(path: Path, numbers: Pairs, counts: Mask, units: dict[str, str]) -> None:
-    """Draw one panel a number that both know, on rows that count: into .svg, .png or .pdf.
+def draw(path: Path, numbers: Pairs, counts: Mask, units: dict[str, str]) -> list[str]:
+    """Draw one panel a number that both know, on rows that count; return the numbers that found no place.
 
+    A .pdf gets as many pages as it needs; .svg and .png are one, on which clinical angles come first.
     Raises TableError for another ending or when there is nothing to draw, MissingExtra without matplotlib.
     """
     if path.suffix not in ENDINGS:
         raise TableError(f"{path}: a figure's name ends in {', '.join(ENDINGS)}")
     try:
         import matplotlib
+        from matplotlib.backends.backend_pdf import PdfPages
         from matplotlib.figure import Figure
     except ImportError:
         raise MissingExtra("--figure needs matplotlib: pip install 'brachium[report]'") from None
@@ -39,14 +44,24 @@ def draw(path: Path, numbers: Pairs, counts: Mask, units: dict[str, str]) -> Non
             panels[name] = (pair, figures)
     if not panels:
         raise TableError("nothing to draw: the two share no number, only orientations")
-    rows = math.ceil(len(panels) / ACROSS)
-    figure = Figure(figsize=(3.7 * min(ACROSS, len(panels)), 2.5 * rows + 0.3), layout="constrained", dpi=150)
-    for place, (name, (pair, figures)) in enumerate(panels.items()):
-        axes = figure.add_subplot(rows, min(ACROSS, len(panels)), place + 1)
-        unit = units.get(name, "")
-        _panel(axes, name, LABELLED.get(unit, unit), pair, figures)
+    in_order = sorted(panels, key=lambda name: name.removesuffix("_r").removesuffix("_l") not in CLINICAL)
+    pages = [in_order[first : first + A_PAGE] for first in range(0, len(in_order), A_PAGE)]
+    figures_of = []
+    for names in pages if path.suffix == ".pdf" else pages[:1]:
+        rows, across = math.ceil(len(names) / ACROSS), min(ACROSS, len(names))
+        figure = Figure(figsize=(3.7 * across, 2.5 * rows + 0.3), layout="constrained", dpi=150)
+        for place, name in enumerate(names):
+            unit = units.get(name, "")
+            _panel(figure.add_subplot(rows, across, place + 1), name, LABELLED.get(unit, unit), *panels[name])
+        figures_of.append(figure)
+    if path.suffix == ".pdf":
+        with PdfPages(path) as book:
+            for figure in figures_of:
+                book.savefig(figure)
+        return []
     with matplotlib.rc_context({"svg.hashsalt": "bland-altman", "svg.fonttype": "path"}):
-        figure.savefig(path, metadata={"Date": None} if path.suffix == ".svg" else None)
+        figures_of[0].savefig(path, metadata={"Date": None} if path.suffix == ".svg" else None)
+    return in_order[A_PAGE:]
 
 
 def _panel(axes: Any, name: str, unit: str, pair: tuple[Any, Any], figures: Agreement) -> None:

@@ -86,7 +86,7 @@ class Comparison:
     per_repetition: dict[str, PerRepetition] = field(default_factory=dict)
     """Only over rows in which a number was measured."""
     assumed: dict[str, dict[str, float]] = field(default_factory=dict)
-    """Of columns that are not measured throughout: the share of rows that rests on an assumption, by a and b."""
+    """Of columns not measured throughout: the share of rows that rests on an assumption, in a and in b."""
 
     def to_json(self) -> dict[str, Any]:
         """Return the same as maps, text and numbers."""

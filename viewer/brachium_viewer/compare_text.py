@@ -19,6 +19,7 @@ def text(comparison: Comparison) -> str:
         lines += [_line("  heading, deg", o.heading), _line("  inclination, deg", o.inclination)]
     lines += [_line(f"{pair}, deg", e) for pair, e in c.relative.items()]
     lines += [_line(_named(c, name), e) for name, e in c.columns.items()]
+    lines += _assumed(c)
     if c.agreement:
         lines += ["", "agreement, row by row", _HEAD]
         lines += [_agreement(_named(c, name), e) for name, e in c.agreement.items()]
@@ -84,6 +85,17 @@ def _aligned(a: Aligned) -> list[str]:
         if kind in a.before
     ]
     return lines
+
+
+def _assumed(c: Comparison) -> list[str]:
+    """Return which columns are no measurement, together where it holds for the same rows."""
+    alike: dict[str, list[str]] = {}
+    for name, shares in c.assumed.items():
+        said = " and ".join(
+            f"{100.0 * share:.3g} % of {side.upper()}'s rows" for side, share in shares.items() if share
+        )
+        alike.setdefault(said, []).append(name)
+    return [f"assumed, not measured, in {said}: {', '.join(names)}" for said, names in alike.items()]
 
 
 def _repetitions(c: Comparison) -> list[str]:

@@ -1,6 +1,9 @@
 """What two tables have in common, row beside row at any lag. Pure."""
 
-from dataclasses import dataclass, replace
+import difflib
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field, replace
+from fnmatch import fnmatchcase
 
 import numpy as np
 import numpy.typing as npt
@@ -9,12 +12,15 @@ from brachium_body.rotation import inverse, multiply
 from brachium_viewer import alignment as al
 from brachium_viewer import one_frame
 from brachium_viewer.statistics import ErrorFigures, error_figures, orientation_errors_deg
+from brachium_viewer.table_quality import assumed_rows
 from brachium_wire.table import Table, TableError
 
 Floats = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]
 WITHIN_S = 0.5
 """A lag is looked for up to this: radio, batches and filters together stay far below."""
+NO_MEASURE = "shoulder_shift_sd_"
+"""How uncertain a result says it is: no quantity of which two results could be right or wrong."""
 COARSE = 5
 """Lags are first tried this many samples apart."""
 
@@ -36,6 +42,27 @@ class Matched:
     orientations: one_frame.Pairs
     numbers: one_frame.Pairs
     counts: Mask
+    assumed: dict[str, tuple[Mask, Mask]] = field(default_factory=dict)
+    """Of numbers that one side only assumed: the rows (n,) of a and of b where it did."""
+
+    def measured(self, name: str) -> tuple[Floats, Floats]:
+        """Return a number of a and b, NaN where one of them is assumed."""
+        a, b = self.numbers[name]
+        if name not in self.assumed:
+            return a, b
+        either = self.assumed[name][0] | self.assumed[name][1]
+        return np.where(either, np.nan, a), np.where(either, np.nan, b)
+
+    def assumed_shares(self) -> dict[str, dict[str, float]]:
+        """Return of every number not wholly measured the share of its rows that is assumed, in a and b."""
+        shares = {}
+        for name, masks in self.assumed.items():
+            rows = self.counts & np.isfinite(self.numbers[name][0]) & np.isfinite(self.numbers[name][1])
+            if any(mask[rows].any() for mask in masks):
+                shares[name] = {
+                    side: float(mask[rows].mean()) for side, mask in zip("ab", masks, strict=True)
+                }
+        return shares
 
     def columns(self) -> dict[str, ErrorFigures]:
         """Return the error of every common number."""
@@ -85,7 +112,9 @@ class Matched:
 class Pair:
     """Two tables and what they have in common."""
 
-    def __init__(self, a: Table, b: Table, names: tuple[str, str], leave_out: str = "") -> None:
+    def __init__(
+        self, a: Table, b: Table, names: tuple[str, str], leave_out: str = "", columns: Sequence[str] = ()
+    ) -> None:
         self._a, self._b = a.columns, b.columns
         a_name, self.a_time = al.time_of(a, names[0])
         b_name, self.b_time = al.time_of(b, names[1])
@@ -95,6 +124,7 @@ class Pair:
             n
             for n in common
             if not al.is_orientation(n)
+            and not n.startswith(NO_MEASURE)
             and a.columns[n].dtype.kind in "if"
             and b.columns[n].dtype.kind in "if"
         ]
@@ -104,6 +134,20 @@ class Pair:
                 raise TableError(f"column {n}: {names[0]} is in {a.units[n]}, {names[1]} in {b.units[n]}")
         if not self.stems and not self.numbers:
             raise TableError(f"{names[0]} and {names[1]} have no column in common that could be compared")
+        if columns:
+            self._choose(columns)
+        told = {n: (assumed_rows(a, n), assumed_rows(b, n)) for n in self.numbers}
+        self._assumed = {n: masks for n, masks in told.items() if any(m is not None for m in masks)}
+
+    def _choose(self, columns: Sequence[str]) -> None:
+        """Leave only what one of the names says, in which * stands for anything."""
+        both = [*self.stems, *self.numbers]
+        for name in columns:
+            if not _among(both, [name]):
+                near = difflib.get_close_matches(name, both, n=1)
+                hint = f"did you mean {near[0]}?" if near else f"there are {', '.join(both)}"
+                raise TableError(f"column {name!r} is not in both; {hint}")
+        self.stems, self.numbers = _among(self.stems, columns), _among(self.numbers, columns)
 
     def at(self, lag_s: float, counts: Mask) -> Matched:
         """Return a's row at t + lag beside b's at t."""
@@ -121,7 +165,14 @@ class Pair:
             a, b = (side[n].astype(np.float64) for side in (self._a, self._b))
             a = al.numbers_at(time, self.a_time, a, turns=turns)
             numbers[n] = (b + al.difference(a, b, turns=True) if turns else a, b)
-        return Matched(self.b_time, orientations, numbers, counts)
+        assumed = {
+            n: (
+                np.zeros(len(time), dtype=np.bool_) if a is None else np.interp(time, self.a_time, a) > 0.0,
+                np.zeros(len(time), dtype=np.bool_) if b is None else b,
+            )
+            for n, (a, b) in self._assumed.items()
+        }
+        return Matched(self.b_time, orientations, numbers, counts, assumed)
 
     def best_lag_s(self, counts: Mask, max_samples: int | None) -> float:
         """Return the lag, a whole number of b's samples, at which a and b differ least."""
@@ -139,6 +190,10 @@ class Pair:
             return period * best(range(-limit, limit + 1))
         near = best(range(-(limit // COARSE) * COARSE, limit + 1, COARSE))
         return period * best(range(max(-limit, near - COARSE), min(limit, near + COARSE) + 1))
+
+
+def _among(names: Iterable[str], patterns: Sequence[str]) -> list[str]:
+    return [name for name in names if any(fnmatchcase(name, pattern) for pattern in patterns)]
 
 
 def _seen_from(first: Floats, second: Floats) -> Floats:

@@ -9,6 +9,7 @@ brachium compare angles.csv truth.parquet --lag estimate
 """
 
 import argparse
+import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -34,6 +35,9 @@ def configure(parser: argparse.ArgumentParser) -> None:
         "--repetitions",
         metavar="COLUMN",
         help="what rises once a repetition (default auto: the angle that moves most; none: no cutting)",
+    )
+    parser.add_argument(
+        "--columns", metavar="NAME,..", help="only these, as in elbow_flexion,wrist_* (default: all in both)"
     )
     parser.add_argument(
         "--figure", type=Path, metavar="FILE", help="draw Bland-Altman plots (.svg, .png or .pdf)"
@@ -65,7 +69,7 @@ def run(args: argparse.Namespace) -> int:
         return _live(args)
     if args.emulate or args.seconds is not None:
         raise Usage("--emulate and --seconds go with --live")
-    from brachium_viewer import compare, compare_text
+    from brachium_viewer import agreement_chart, compare, compare_text
 
     a, b = Path(args.a), Path(args.b)
     for path in (a, b):
@@ -78,11 +82,21 @@ def run(args: argparse.Namespace) -> int:
     }
     if args.lag is not None:
         chosen["lag"] = args.lag if args.lag == "estimate" else _seconds(args.lag)
-    found = compare.compare(a, b, replace(compare.settings_beside(b), **chosen), figure=args.figure)
+    if args.columns is not None:
+        chosen["columns"] = tuple(name.strip() for name in args.columns.split(","))
+    found, rows = compare.compare(a, b, replace(compare.settings_beside(b), **chosen))
     if args.json:
         print_json(found)
     else:
-        print(compare_text.text(found), end="")
+        print(compare_text.text(found), end="", flush=True)
+    if args.figure is not None:  # whatever becomes of it, the figures are told
+        left_out = agreement_chart.draw(args.figure, rows.numbers, rows.counts, found.units)
+        if left_out:
+            print(
+                f"{args.figure}: no room for {len(left_out)} columns ({', '.join(left_out[:3])} ..): "
+                "choose with --columns, or write a .pdf, which has pages for all",
+                file=sys.stderr,
+            )
     return 0
 
 
