@@ -26,6 +26,8 @@ LEARN = 0.02
 """Weight of a datagram in the mean number of samples that datagrams carry."""
 MAX_ASKED = 16
 RECENT = 10
+MAX_LOST = 100_000
+"""More than a tracker sends in the 3 s after which it would be gone: such a number is none."""
 
 
 class RoundTrips:
@@ -154,7 +156,8 @@ class Tracker:
     """When it is asked next whether it rests."""
 
     def take_number(self, number: int) -> int | None:
-        """Return how many datagrams were lost before this one; None for one that a later one overtook.
+        """Return how many datagrams were lost before this one; None for one that a later one overtook, or whose
+        number cannot be.
 
         0 is no number: what the tracker sends back as it came carries it.
         """
@@ -162,7 +165,7 @@ class Tracker:
             return 0
         last, lost = self.number, 0
         if last is not None:
-            if number <= last:
+            if not last < number <= last + MAX_LOST:
                 return None
             lost = number - last - 1
         self.number = number
