@@ -156,8 +156,9 @@ class Tracker:
     """When it is asked next whether it rests."""
 
     def take_number(self, number: int) -> int | None:
-        """Return how many datagrams were lost before this one; None for one that a later one overtook, or whose
-        number cannot be.
+        """Return how many datagrams were lost before this one.
+
+        None for one that a later one overtook, or whose number cannot be.
 
         0 is no number: what the tracker sends back as it came carries it.
         """
