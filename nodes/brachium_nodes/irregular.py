@@ -88,7 +88,8 @@ class Irregular:
         }
         if self.impaired:
             phase = tau * float(variation.uniform("irregular/phase", 0))
-            values[self._main] = values[self._main] + TREMOR_DEG * np.sin(tau * TREMOR_HZ * t + phase)
+            size = TREMOR_DEG * minimum_jerk(t)  # it begins with the exercise, within a second
+            values[self._main] = values[self._main] + size * np.sin(tau * TREMOR_HZ * t + phase)
         return posture(values)
 
     @property

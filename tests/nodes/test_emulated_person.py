@@ -101,11 +101,11 @@ def test_bones_keep_their_lengths(exercise: str) -> None:
 
 @pytest.mark.parametrize("exercise", EXERCISES)
 def test_motion_is_smooth_from_standing_still_on(exercise: str) -> None:
-    step = 1e-3
+    step = 5e-4
     person = Person(PersonSettings(exercise=exercise, seed=7, sway_deg=2.0))
     hand = person.arm(np.arange(NEUTRAL_S - 0.1, 40.0, step), "right").joints["hand"]
     acceleration = np.diff(hand, 2, axis=0) / step**2
-    # A jump of 1 mm/s in velocity anywhere would show as 1 m/s^2 here.
+    # A jump of 1 mm/s in velocity anywhere would show as 2 m/s^2 here; the worst tremor is smooth.
     assert np.abs(np.diff(acceleration, axis=0)).max() < 0.4
     assert np.abs(acceleration).max() > 0.5
 
