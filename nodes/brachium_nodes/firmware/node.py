@@ -187,22 +187,10 @@ class Node:
             await self._say_bye(self._link)
 
     async def _say_bye(self, link):
-        batches = self._batches
-        batches.close()
-        try:
-            batch = batches.next()
-            while batch is not None:
-                await asyncio.wait_for(link.send(batches.fill, batch), 2)
-                batches.sent(batch)
-                batch = batches.next()
-            await asyncio.wait_for(link.send(self._bye), 2)
-            while True:
-                await asyncio.wait_for(link.receive(), 2)
-        except (OSError, EOFError, asyncio.TimeoutError):
-            pass
-        print(
-            "sent %d, dropped %d, next %d" % (batches.delivered, batches.dropped, self._sensor.clock.number)
-        )
+        gc.collect()
+        from leaving import say_bye
+
+        await say_bye(link, self._batches, self._sensor.clock)
 
     def _clock_answer(self, writer, number, came):
         writer.begin(3, "clock/1")
@@ -220,10 +208,6 @@ class Node:
         if signal is not None:
             writer.real("rssi", signal)
         writer.whole("drop", self._batches.dropped)
-
-    def _bye(self, writer):
-        writer.begin(1, "bye/1")
-        writer.whole("next", self._sensor.clock.number)
 
 
 def _kept(writer):
