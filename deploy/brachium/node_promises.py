@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from brachium.proofs import Promise, Proof, Take, figure
+from brachium.proofs import Promise, Proof, Take, at, figure
 
 
 def _worst(name: str) -> Take:
@@ -108,7 +108,46 @@ def _hostile() -> Proof:
     )
 
 
+SHIMMER_DELAY_S = 0.04
+
+
+def _beside_a_shimmer() -> Proof:
+    """The paper's experiment, own node and Shimmer3 on one forearm; demo-typical has the wrist's target."""
+    words = ("compare", "--live", "p01", "p01.ref", "--emulate", "--seconds", "30", "--level", "typical")
+    worn, aligned = ("found", "as_worn", "places"), ("found", "aligned", "places")
+    return Proof(
+        name="beside-a-shimmer",
+        commands=((*words, "--shimmer-delay", str(SHIMMER_DELAY_S), "--json"),),
+        promises=(
+            Promise(
+                name="clocks' offset off the injected",
+                unit="ms",
+                take=lambda f: 1e3 * abs(f["found"]["clock"]["offset_s"] - SHIMMER_DELAY_S),
+                at_most=5.0,
+            ),
+            _in_mm("clocks' offset, half its 95 % interval", "found", "clock", "margin_s", unit="ms"),
+            *(
+                _in_mm(f"{name}, {joint}, {what}", *places, joint, *path)
+                for name, places in (("as worn", worn), ("aligned", aligned))
+                for joint in ("wrist", "hand")
+                for what, path in (("eq 17 RMSE", ("eq17", "rmse")), ("3-D RMSE", ("apart", "rmse")))
+            ),
+            _in_mm("own node, wrist against the truth", "found", "truth", "a", "wrist", "rmse", at_most=30.0),
+            _in_mm("Shimmer3, wrist against the truth", "found", "truth", "b", "wrist", "rmse", at_most=30.0),
+        ),
+    )
+
+
+def _in_mm(name: str, *path: str, unit: str = "mm", at_most: float | None = None) -> Promise:
+    def take(figures: dict[str, Any]) -> float | None:
+        found = at(*path)(figures)
+        return None if found is None else 1e3 * found
+
+    return Promise(name=name, unit=unit, take=take, at_most=at_most)
+
+
 NODE_PROOFS: tuple[Proof, ...] = (
+    _beside_a_shimmer(),
     *(_firmware(run, rate_hz) for run in ("quiet", "faults") for rate_hz in (50, 100)),
     _battery(),
     _clock(),

@@ -2,7 +2,6 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -92,7 +91,8 @@ def orientation_errors_deg(estimate: Array, reference: Array) -> tuple[Array, Ar
     return np.degrees(total), wrap_deg(np.degrees(heading)), np.degrees(inclination)
 
 
-class NormFigures(NamedTuple):
+@dataclass(frozen=True, slots=True)
+class NormFigures:
     """Tsilomitrou's eq 17, m."""
 
     mae: float

@@ -74,7 +74,8 @@ def _table(title: str, c: LiveComparison, agreed: Agreed) -> list[str]:
     )
     paper = PAPER.get(c.found.segment[:-2], {})
     for joint, p in agreed.places.items():
-        norms = "".join(f"{1e3 * x:>{w}.1f}" for x, w in zip(p.eq17, (7, 9, 7), strict=True))
+        n = p.eq17
+        norms = f"{1e3 * n.mae:>7.1f}{1e3 * n.largest:>9.1f}{1e3 * n.rmse:>7.1f}"
         lines.append(
             f"  {NAMES[joint]:<14}{norms}  " + _mm(p.apart.bias, p.apart.sd, p.apart.rmse, p.apart.max_abs)
         )

@@ -109,7 +109,9 @@ def _place(
         second = context.emulated(replace(trial, second_set=True))
         reference = second.solved(method).positions[joint][made.counts]
     norm, apart = eq17(found, reference), rms(found - reference)
-    figures: list[float | None] = [None, None, None] if norm is None else list(norm)
+    figures: list[float | None] = [None, None, None]
+    if norm is not None:
+        figures = [norm.mae, norm.largest, norm.rmse]
     return [None if f is None else 1e3 * f for f in (*figures, apart)]
 
 

@@ -8,6 +8,7 @@ import tty
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from errno import ENOENT
 from pathlib import Path
 
 from brachium_body.segments import SEGMENTS, Segment
@@ -136,6 +137,8 @@ def _write(master: int, data: bytes) -> bool:
 @contextmanager
 def _terminal(path: Path) -> Iterator[int]:
     """Yield the device's end of a new pseudo-terminal whose other end is to be found at `path`."""
+    if not path.parent.is_dir():
+        raise FileNotFoundError(ENOENT, "no such folder", str(path.parent))
     master, slave = pty.openpty()
     tty.setraw(master)
     tty.setraw(slave)
