@@ -20,6 +20,7 @@ COMMANDS: dict[str, str] = {
     "record": "the recorder",
     "monitor": "the network in the terminal: nodes, rates, loss, latency",
     "sensor": "fit a sensor's own calibration from a recording, and keep it for the gateway",
+    "conformance": "try any node from outside against the rules of the node protocol",
     "firmware": "compile the wearables' firmware, or run it on this machine",
     "solve": "a capture folder or a recording to angles, positions and orientations",
     "compare": "error statistics between two results",

@@ -93,7 +93,7 @@ class Roster:
 
         `other_host` is another host through which the node's subject already comes in, or None.
         """
-        wrong = _wrong(hello)
+        wrong = wrong_hello(hello)
         if wrong:
             return Refusal("bad_hello", wrong)
         entry = self._entries.get(hello.node)
@@ -195,7 +195,7 @@ def _known_segment(segment: str) -> None:
         raise ValueError(f"segment {segment[:80]!r} is not known; choose one of {', '.join(SEGMENTS)}")
 
 
-def _wrong(hello: Hello) -> str:
+def wrong_hello(hello: Hello) -> str:
     """Return what is wrong with a hello, or "" when nothing is."""
     try:
         keys.chunk(hello.node, "node id")
