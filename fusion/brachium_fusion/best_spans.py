@@ -10,7 +10,7 @@ from brachium_fusion.best_material import Material
 from brachium_fusion.pose_watch import POSE_USED_NS, STILL_S
 from brachium_fusion.segment_records import leaves_open
 from brachium_fusion.sensor_to_segment import Span
-from brachium_fusion.stillness import STILL_RAD_S
+from brachium_fusion.track import STILL_RAD_S
 
 Floats = npt.NDArray[np.float64]
 

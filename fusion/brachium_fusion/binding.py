@@ -13,10 +13,9 @@ from brachium_fusion.arm_knowledge import Centres, arm_knowledge
 from brachium_fusion.live_arm import LiveArm
 from brachium_fusion.live_shoulder import RestMean
 from brachium_fusion.pose import Alignment
-from brachium_fusion.stillness import STILL_RAD_S
 from brachium_fusion.strap_slip import Slip
 from brachium_fusion.timeline import Motion, Reading, SensorNow, Shift, at_instant
-from brachium_fusion.track import SegmentTrack
+from brachium_fusion.track import STILL_RAD_S, SegmentTrack
 
 Floats = npt.NDArray[np.float64]
 Readings = dict[str, Reading | None]

@@ -65,20 +65,23 @@ class Shift(NamedTuple):
 
 
 class Moved:
-    """Rates and forces of a batch, and of the last sample before it, calibrated; joined when one asks."""
+    """Rates and forces of a batch, and of the batch before it, calibrated; joined when somebody asks."""
 
     __slots__ = ("_joined", "_own")
 
-    def __init__(self, gyr: Floats, acc: Floats, before: tuple[Floats, Floats]) -> None:
+    def __init__(self, gyr: Floats, acc: Floats, before: tuple[Floats, Floats] | None) -> None:
         self._own = gyr, acc, before
         self._joined: Floats | None = None
 
     def rows(self) -> Floats:
         """Return gyr and acc (n + 1, 6): of the last sample before the batch, then of its own."""
         if self._joined is None:
-            gyr, acc, (gyr_before, acc_before) = self._own
+            gyr, acc, before = self._own
             joined = np.empty((len(gyr) + 1, 6))
-            joined[0, :3], joined[0, 3:], joined[1:, :3], joined[1:, 3:] = gyr_before, acc_before, gyr, acc
+            joined[1:, :3], joined[1:, 3:] = gyr, acc
+            joined[0, :3], joined[0, 3:] = (
+                (gyr[0], acc[0]) if before is None else (before[0][-1], before[1][-1])
+            )
             self._joined = joined
         return self._joined
 
@@ -229,4 +232,4 @@ class Timeline:
 
 
 def _moved(rows: Floats) -> Moved:
-    return Moved(rows[1:, :3], rows[1:, 3:], (rows[0, :3], rows[0, 3:]))
+    return Moved(rows[1:, :3], rows[1:, 3:], (rows[:1, :3], rows[:1, 3:]))

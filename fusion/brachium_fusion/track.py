@@ -9,7 +9,6 @@ import numpy.typing as npt
 from brachium_body import rotation
 from brachium_fusion.calibrated import Calibrated
 from brachium_fusion.orientation import FilterName, OrientationFilter, make
-from brachium_fusion.stillness import Stillness
 from brachium_fusion.timeline import Block, Moved, Timeline
 from brachium_wire.codec import Drop
 from brachium_wire.messages import Info, Quality
@@ -26,6 +25,8 @@ SETTLE_NS = 5_000_000_000
 """After a gap that was not bridged, tilt and heading take this long to come back (VQF's tau_acc is 3 s)."""
 AHEAD_NS = 1_000_000_000
 """A sample cannot be from later than its arrival; one that claims more than this would end the stream."""
+STILL_RAD_S = 0.15
+"""A sensor turning slower than this is still: above hand tremor and sway, far below any movement."""
 DISTURBED_NS = 2_000_000_000
 """A magnetic disturbance is reported once it lasted this long; brushing past a chair is not worth a flag."""
 
@@ -38,7 +39,8 @@ class SegmentTrack:
         self.magnetometer = info.magnetometer and use_magnetometer and not info.orientation_only
         self.counter = SequenceCounter()
         self.last_ns = 0
-        self._stillness = Stillness()
+        self.still_since_ns = 0
+        """All samples from here on were still; host time."""
         self.batch_ns = 0
         """The longest time that a recent batch spanned: how far behind a healthy sensor may seem."""
         self._filter_name: FilterName = filter_name
@@ -61,11 +63,6 @@ class SegmentTrack:
     def shares_world(self) -> bool:
         """Whether its world's heading is the common one: magnetic north holds it, or another reference."""
         return self.magnetometer or (self.info.orientation_only and not self.info.heading_free)
-
-    @property
-    def still_since_ns(self) -> int:
-        """All samples from here on were still; host time."""
-        return self._stillness.since_ns
 
     def feed(self, samples: Samples, drops: Counter[str]) -> bool:
         """Take a batch; return False, with the reason counted in samples, when it cannot be used."""
@@ -119,15 +116,15 @@ class SegmentTrack:
             else:
                 self._bridge(gyr[0], acc[0], missing)
         quats = self._filter.update(gyr, acc, mag, samples.mag_index)
-        moved = Moved(gyr, acc, self._last or (gyr[0], acc[0]))
-        self._last = gyr[-1], acc[-1]
-        self._stillness.see(gyr, samples.time_ns)
+        moved = Moved(gyr, acc, self._last)
+        self._last = gyr, acc
+        self._note_still(gyr, samples.time_ns)
         self._append(samples, quats, moved, kind, self._is_disturbed(samples.time_ns[-1]))
 
     def _bridge(self, gyr: Floats, acc: Floats, missing: int) -> None:
         """Carry the filter over missing samples along a straight line between the ends of the gap."""
         assert self._last is not None
-        last_gyr, last_acc = self._last
+        last_gyr, last_acc = self._last[0][-1], self._last[1][-1]
         part = (np.arange(1, missing + 1) / (missing + 1.0))[:, None]
         self._filter.update(
             last_gyr + part * (gyr - last_gyr), last_acc + part * (acc - last_acc), None, None
@@ -144,8 +141,20 @@ class SegmentTrack:
                 self.restarts += 1  # switched off and on it would have another heading
         previous = self.timeline.last.quats[-1] if self.timeline else quats[0]
         steps = rotation.angle_between(np.vstack([previous, quats[:-1]]), quats) * self.info.rate_hz
-        self._stillness.see(np.column_stack([steps, np.zeros((len(steps), 2))]), samples.time_ns)
+        self._note_still(np.column_stack([steps, np.zeros((len(steps), 2))]), samples.time_ns)
         self._append(samples, quats, None, kind, disturbed=False)
+
+    def _note_still(self, gyr: Floats, times: list[int]) -> None:
+        if self.still_since_ns == 0:
+            self.still_since_ns = times[0]
+        after = len(times)
+        for x, y, z in reversed(
+            gyr.tolist()
+        ):  # the last movement tells; a few numbers, faster than as arrays
+            after -= 1
+            if x * x + y * y + z * z > STILL_RAD_S**2:
+                self.still_since_ns = times[after] + 1
+                return
 
     def _is_disturbed(self, now_ns: int) -> bool:
         if now_ns < self._settled_ns:
@@ -189,7 +198,9 @@ class SegmentTrack:
             "batch_ns": self.batch_ns,
             "filter": self._filter.state(),
             "blocks": self.timeline.state(),
-            "last": None if self._last is None else [*self._last[0].tolist(), *self._last[1].tolist()],
+            "last": None
+            if self._last is None
+            else [*self._last[0][-1].tolist(), *self._last[1][-1].tolist()],
             "disturbed_since": self._disturbed_since,
             "settled_ns": self._settled_ns,
             "restarts": self.restarts,
@@ -200,10 +211,10 @@ class SegmentTrack:
         """Go on as the track whose state this is would have."""
         self.counter = SequenceCounter(*state["counter"])
         self.counter.gaps = [(first, end) for first, end in state["gaps"]]
-        self.last_ns, self._stillness = state["last_ns"], Stillness(state["still_since_ns"])
+        self.last_ns, self.still_since_ns = state["last_ns"], state["still_since_ns"]
         self.batch_ns, self.restarts, self.reboots = state["batch_ns"], state["restarts"], state["reboots"]
         self._filter.restore(state["filter"])
         self.timeline.restore(state["blocks"])
-        last = None if state["last"] is None else np.array(state["last"])
-        self._last = None if last is None else (last[:3], last[3:])
+        last = None if state["last"] is None else np.array([state["last"]])
+        self._last = None if last is None else (last[:, :3], last[:, 3:])
         self._disturbed_since, self._settled_ns = state["disturbed_since"], state["settled_ns"]
