@@ -84,6 +84,19 @@ class Tracker(_Table, frozen=True, kw_only=True):
     rate_hz: float = 100.0
 
 
+class Shimmer(_Table, frozen=True, kw_only=True):
+    """A Shimmer3 and where it is worn."""
+
+    port: str
+    """Its serial port, as `/dev/rfcomm0`."""
+    subject: str
+    """`p01.ref`: a second set of sensors on p01."""
+    segment: Segment
+    rate_hz: float = 51.2
+    accelerometer: Literal["wide-range", "low-noise"] = "wide-range"
+    mounting: Quaternion | None = None
+
+
 class Site(_Table, frozen=True, kw_only=True):
     """The whole file."""
 
@@ -91,6 +104,7 @@ class Site(_Table, frozen=True, kw_only=True):
     subject: tuple[Subject, ...] = ()
     node: tuple[Node, ...] = ()
     tracker: tuple[Tracker, ...] = ()
+    shimmer: tuple[Shimmer, ...] = ()
 
 
 def find(name: str) -> Path:
@@ -157,7 +171,7 @@ def _check(site: Site) -> None:
         raise BadSite(str(error)) from None
     subjects = _once([subject.id for subject in site.subject], "subject")
     _once([node.id for node in site.node], "node")
-    worn: tuple[Node | Tracker, ...] = (*site.node, *site.tracker)
+    worn: tuple[Node | Tracker | Shimmer, ...] = (*site.node, *site.tracker, *site.shimmer)
     places = [f"{one.segment} of {one.subject}" for one in worn if one.segment is not None]
     _once(places, "sensor place")
     for tracker in site.tracker:
@@ -172,6 +186,12 @@ def _check(site: Site) -> None:
             raise BadSite(f"node {node.id!r} names subject {node.subject!r}, which no [[subject]] has")
         if not re.fullmatch("[0-9a-f]{64}", node.token_sha256):
             raise BadSite(f"node {node.id!r}: token_sha256 must be 64 digits of lower-case hex")
+    for shimmer in site.shimmer:
+        if shimmer.subject not in subjects:
+            raise BadSite(
+                f"shimmer {shimmer.port!r} names subject {shimmer.subject!r}, which no [[subject]] has"
+            )
+    _once([shimmer.port for shimmer in site.shimmer], "port")
     _check_listening(site.room)
 
 

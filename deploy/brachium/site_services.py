@@ -5,7 +5,7 @@ import ipaddress
 from dataclasses import dataclass
 from pathlib import Path
 
-from brachium.site_file import Site, Subject
+from brachium.site_file import Shimmer, Site, Subject
 from brachium_wire.messages import Session
 
 
@@ -73,10 +73,20 @@ def services(site: Site, path: Path, *, join_token: str, users_file: Path | None
     if users_file is not None:
         words["router"] += ["--users", str(users_file)]
     ports = {"router": room.ports.router, "gateway": room.ports.gateway, "view": room.ports.web}
-    return [
+    named = [
         Service(name=name, words=words[name], kind=KINDS[name], port=ports.get(name))
         for name in room.services
     ]
+    return [*named, *(_shimmer(shimmer, network) for shimmer in site.shimmer)]
+
+
+def _shimmer(shimmer: Shimmer, network: list[str]) -> Service:
+    words = ["--port", shimmer.port, "--subject", shimmer.subject, "--segment", shimmer.segment]
+    words += ["--rate", str(shimmer.rate_hz), "--accelerometer", shimmer.accelerometer]
+    if shimmer.mounting is not None:
+        words.append(f"--mounting={','.join(map(str, shimmer.mounting))}")
+    name = f"shimmer-{shimmer.subject}-{shimmer.segment}"
+    return Service(name=name, words=["shimmer", *network, *words], kind="shimmer")
 
 
 def session(subject: Subject) -> Session:

@@ -84,12 +84,12 @@ def _watch(site: Site, wanted: list[Service], processes: Processes, stop: thread
     bus = _join(site, processes, stop)
     if bus is None:
         return
-    names = {service.kind: service.name for service in wanted}
 
     def changed(key: str, alive: bool) -> None:
-        name = names.get(keys.parse(key).detail.split("/")[0])
-        if alive and name is not None:
-            processes.children[name].came_up = True
+        kind = keys.parse(key).detail.split("/")[0]
+        for service in wanted:
+            if alive and service.kind == kind:
+                processes.children[service.name].came_up = True
 
     with bus:
         bus.watch_alive(keys.services(site.room.id, "*/*/alive"), changed)
