@@ -146,6 +146,66 @@ def _in_mm(name: str, *path: str, unit: str = "mm", at_most: float | None = None
     return Promise(name=name, unit=unit, take=take, at_most=at_most)
 
 
+def _sensors() -> Proof:
+    ways = (("guided", True), ("paper", False), ("uncalibrated", False))
+    limits = {
+        "gyro_bias_dps": ("gyro bias", "deg/s", 0.05),
+        "accel_bias_m_s2": ("accelerometer bias", "m/s^2", 0.03),
+        "accel_scale": ("accelerometer scale", "1", 0.003),
+        "mag_direction_deg": ("direction of the field", "deg", 1.0),
+    }
+    return Proof(
+        name="sensor-calibration",
+        commands=(("bench", "--sensors", "--chips", "10", "--json"),),
+        promises=(
+            Promise(
+                name="networks whose node has forgotten it",
+                unit="1",
+                take=lambda f: (
+                    not (f["network"]["brought_again"] and f["network"]["kept_after_restart"] == "node")
+                ),
+                at_most=0,
+            ),
+            figure("from asking to kept on the node", "s", "network", "seconds"),
+            figure("bad handlings taken for good", "1", "not_refused", at_most=0),
+            *(
+                figure(
+                    f"{text} off, {way}, worst of 10", unit, "worst", way, name, at_most=most * held or None
+                )
+                for way, held in ways
+                for name, (text, unit, most) in limits.items()
+            ),
+        ),
+    )
+
+
+def _can() -> tuple[Proof, ...]:
+    """Sensors on CAN, and a machine on CAN."""
+    load = (
+        figure("12 sensors at 100 Hz, of a core", "1", "cpu", at_most=0.15),
+        figure("a bare loop of python-can, of a core", "1", "bare_cpu"),
+        figure("frames in", "1/s", "frames_per_s"),
+        figure("samples off the sensors'", "1", "samples_off", at_most=0.01),
+    )
+    mixing = (
+        figure("samples of two", "1", "mixed", at_most=0),
+        figure("out of order", "1", "out_of_order", at_most=0),
+        figure("samples", "1", "samples"),
+        figure("of them whole", "1", "given"),
+    )
+    faults = (
+        figure("valid and 5 deg off, 50 ms after a fault", "joints", "wrong_after", at_most=0),
+        figure("frames then", "1", "frames_after"),
+        figure("worst valid angle then", "deg", "worst_after_deg"),
+        figure("valid before, worst round", "1", "valid_before"),
+    )
+    promises = {"load": load, "mixing": mixing, "faults": faults}
+    return tuple(
+        Proof(name=f"can-{what}", commands=(("bench", "--can", what, "--json"),), promises=found)
+        for what, found in promises.items()
+    )
+
+
 NODE_PROOFS: tuple[Proof, ...] = (
     _beside_a_shimmer(),
     *(_firmware(run, rate_hz) for run in ("quiet", "faults") for rate_hz in (50, 100)),
@@ -153,4 +213,6 @@ NODE_PROOFS: tuple[Proof, ...] = (
     _clock(),
     _gateway(),
     _hostile(),
+    _sensors(),
+    *_can(),
 )

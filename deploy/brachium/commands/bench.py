@@ -3,7 +3,9 @@
 brachium bench --quick
   brachium bench --gateway
   brachium bench --clock --runs 200 --json
+  brachium bench --can load --json
   brachium bench --hostile 1000000 --json
+  brachium bench --sensors --chips 10 --json
 """
 
 import argparse
@@ -29,6 +31,13 @@ def configure(parser: argparse.ArgumentParser) -> None:
     other.add_argument(
         "--hostile", type=whole(1, 100_000_000), metavar="FRAMES", help="instead: a gateway under attack"
     )
+    other.add_argument("--sensors", action="store_true", help="instead: how well sensors are calibrated")
+    parser.add_argument("--chips", type=whole(1, 1000), default=10, help="of --sensors")
+    other.add_argument(
+        "--can",
+        choices=["load", "mixing", "faults"],
+        help="instead: what CAN sensors cost; whether their samples mix; what a machine hears of a fault",
+    )
     parser.add_argument("--nodes", type=whole(1, 500), default=256, help="of --gateway")
     parser.add_argument("--runs", type=whole(1, 10_000), default=200, help="of --clock")
     add_json(parser)
@@ -36,7 +45,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Measure, one network after the other."""
-    if args.gateway or args.clock or args.hostile is not None:
+    if args.gateway or args.clock or args.sensors or args.can or args.hostile is not None:
         return _other(args)
     figures = measure(QUICK_WINDOW_S if args.quick else WINDOW_S, args.arms)
     if args.json:
@@ -57,6 +66,14 @@ def _other(args: argparse.Namespace) -> int:
         from brachium import bench_clock
 
         found = bench_clock.measure(args.runs)
+    elif args.sensors:
+        from brachium import bench_sensors
+
+        found = bench_sensors.measure(args.chips)
+    elif args.can:
+        from brachium import bench_can
+
+        found = bench_can.measure(args.can, QUICK_WINDOW_S if args.quick else WINDOW_S)
     else:
         from brachium import bench_hostile
 
