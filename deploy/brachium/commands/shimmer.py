@@ -1,4 +1,4 @@
-"""Take a Shimmer3 into the network over its serial port (Bluetooth or dock).
+"""Take a Shimmer3 into the network over Bluetooth's serial port.
 
 brachium shimmer --port /dev/rfcomm0 --subject p01.ref --segment forearm_r
 """

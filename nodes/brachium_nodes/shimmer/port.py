@@ -1,4 +1,4 @@
-"""A serial port without a library: what Bluetooth's RFCOMM, a dock and a pseudo-terminal have in common."""
+"""A serial port without a library: what Bluetooth's RFCOMM, a cable and a pseudo-terminal have in common."""
 
 import os
 import select
@@ -8,7 +8,7 @@ from types import TracebackType
 from typing import Self
 
 BAUD = termios.B115200
-"""Of the dock; Bluetooth and pseudo-terminals do not care."""
+"""Of a cable; Bluetooth and pseudo-terminals do not care."""
 WRITE_S = 1.0
 
 
