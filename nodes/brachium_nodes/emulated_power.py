@@ -38,7 +38,9 @@ class EmulatedPower:
     def status(self, time_s: float) -> NodeStatus:
         """Return what the node says at true time `time_s`, to a mV and a dBm, as such nodes do."""
         fading = generator(self.seed, self.segment, "fading", max(0, floor(time_s))).standard_normal()
+        volts = max(self.full_v - self.fall_v_per_s * time_s, EMPTY_V)
         return NodeStatus(
-            battery_v=round(max(self.full_v - self.fall_v_per_s * time_s, EMPTY_V), 3),
+            battery_v=round(volts, 3),
+            battery_hours=round((volts - EMPTY_V) / self.fall_v_per_s / 3600.0, 2),
             rssi_dbm=float(round(self.signal_dbm + FADING_DBM * fading)),
         )

@@ -16,7 +16,9 @@ def test_the_battery_falls_slowly_to_empty_and_the_signal_is_a_room_s(power, a, 
     early, late = power.status(min(a, b)), power.status(max(a, b))
     assert FULL_V[1] >= early.battery_v >= late.battery_v >= EMPTY_V
     assert early.battery_v - late.battery_v <= 0.1 * abs(b - a) / HOUR_S + 0.001
+    assert early.battery_hours - late.battery_hours <= abs(b - a) / HOUR_S + 0.011
     for said in (early, late):
+        assert (said.battery_hours <= 0.01) == (said.battery_v <= EMPTY_V + 0.001)
         assert -85.0 <= said.rssi_dbm <= -30.0
         assert said.rssi_dbm == round(said.rssi_dbm)
         assert said.dropped is None

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from brachium_nodes.emulated_board.board import Counts
+from brachium_nodes.emulated_board.cell import CellSettings
 from brachium_nodes.emulated_board.settings import BoardSettings
 from brachium_nodes.firmware_host import (
     ACC_STEP,
@@ -20,6 +21,7 @@ from brachium_nodes.firmware_host import (
 from brachium_nodes.gateway import token_sha256
 from brachium_nodes.roster import NodeEntry
 from brachium_nodes.wearer import Wearer, WearerSettings
+from brachium_wire.battery import is_low
 from brachium_wire.messages import SampleBatch
 from brachium_wire.samples import read_samples
 
@@ -112,8 +114,11 @@ def test_every_chip_is_read_whole_and_on_time_whatever_its_bus_does(
         Worn(tmp_path, "forearm_r", 50.0, BoardSettings(chip="MPU-9250", ticks_ppm=-80, field_us=45_000)),
         Worn(tmp_path, "hand_r", 50.0, BoardSettings(chip="ICM-42688-P", refusals=0.02)),
     ]
+    wired: dict[str, object] = {
+        "hand_r": {"id": 0, "scl": 6, "sda": 5}
+    }  # the chip's own bus, as an ESP32 has
     url = gateway(*(entry(w.segment, w.segment) for w in worn)).url
-    with switched_on(*(w.start(firmware, url) for w in worn)) as reports:
+    with switched_on(*(w.start(firmware, url, i2c=wired.get(w.segment, {})) for w in worn)) as reports:
         listener.until(
             lambda: (
                 listener.of("imu", "upper_arm_r") and listener.of("imu", "upper_arm_r")[-1].sequence > 500
@@ -151,13 +156,16 @@ def now_us() -> int:
 
 
 def test_a_gateway_is_found_and_the_field_turned_into_the_accelerometers_axes_at_its_own_sample(
-    firmware, gateway, listener, tmp_path, free_port
+    firmware, gateway, listener, tmp_path, free_port, caplog
 ) -> None:
-    one = Worn(tmp_path, "forearm_r", 50.0, BoardSettings(field_adjust=(200, 128, 60)))
+    board = BoardSettings(field_adjust=(200, 128, 60), cell=CellSettings(charge=0.045))
+    one = Worn(tmp_path, "forearm_r", 50.0, board)
     gateway(entry("forearm_r", "forearm_r"), discovery_port=free_port)
     seek = {"address": "127.255.255.255", "port": free_port}
     with switched_on(one.start(firmware, "", discovery=seek)):
         listener.until(lambda: len(listener.of("imu")) > 20, "some seconds of samples")
+        listener.until(lambda: "node forearm_r: low battery" in caplog.text, "a warning of the empty cell")
+    assert is_low(listener.of("status")[-1].battery_hours)
     batches = listener.of("imu")
     numbers = one.numbers(batches)
     first = numbers[0] - batches[0].sequence
