@@ -12,13 +12,22 @@ import numpy.typing as npt
 
 from brachium_body import rotation
 from brachium_body.angles import INDEX, SHOULDER, joint_angles
-from brachium_body.assumptions import StatedAngles, complete, known_set, provenance, withhold
+from brachium_body.assumptions import (
+    ASSUMED,
+    EMPTY,
+    StatedAngles,
+    complete,
+    known_set,
+    provenance,
+    withhold,
+)
 from brachium_body.continuation import AngleTracker
 from brachium_body.denavit_hartenberg import printed_angles
 from brachium_body.kinematics import TRUNK_FROM_THORAX, SegmentOrientations, between, positions
 from brachium_body.segments import SIDES, Side
 from brachium_fusion.rows import Row
 from brachium_fusion.settings import Settings
+from brachium_fusion.shoulder_return import ShoulderReturn
 from brachium_fusion.skeletons import messages
 from brachium_fusion.timeline import Reading
 from brachium_wire.messages import Skeleton
@@ -35,6 +44,7 @@ class Arms:
     def __init__(self, settings: Settings) -> None:
         self._printed = settings.filter == "complementary-printed"
         self._tracker = AngleTracker()
+        self._return = ShoulderReturn()
         self._index: dict[tuple[str, Side], int] = {}
 
     def solve(self, rows: Sequence[Row]) -> list[Skeleton]:
@@ -81,8 +91,11 @@ class Arms:
         drifting = np.array([row.withhold_heading for row in rows])
         if drifting.any():
             angles[np.ix_(drifting, _ON_HEADING)] = np.nan
-        moved = None if shift is None else np.nan_to_num(shift[:, 0])
+        moved, returning = self._return.follow(rows, None if shift is None else shift[:, 0])
         places = withhold(positions(*full, numbers[:, 36:], left, moved), codes.positions)
+        place_codes = codes.positions
+        if returning is not None and returning.any():
+            place_codes = np.where(returning[:, None] & (place_codes != EMPTY), ASSUMED, place_codes)
         return messages(
             rows,
             world_from_sensor,
@@ -91,7 +104,7 @@ class Arms:
             angles,
             codes.angles,
             places,
-            codes.positions,
+            place_codes.astype(np.uint8),
             shift,
         )
 
@@ -114,19 +127,21 @@ class Arms:
     def state(self, subject: str) -> dict[str, Any]:
         """Return the memory of one subject's arms, as plain values: NaN (nothing yet) as None."""
         last = self._tracker.state()
-        return {
+        angles = {
             side: [None if np.isnan(v) else v for v in last[i].tolist()]
             for (who, side), i in self._index.items()
             if who == subject and i < len(last)
         }
+        return {"angles": angles, "shoulders": self._return.state(subject)}
 
     def restore(self, subject: str, state: dict[str, Any]) -> None:
         """Go on as the arms whose memory this is would have."""
         rows = {
             self._arm(subject, side): [np.nan if v is None else v for v in values]
-            for side, values in state.items()
+            for side, values in state["angles"].items()
             if side in SIDES
         }
+        self._return.restore(subject, state["shoulders"])
         self._tracker.grow(len(self._index))
         last = self._tracker.state()
         for index, values in rows.items():

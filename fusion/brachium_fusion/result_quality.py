@@ -18,6 +18,12 @@ NAMES: dict[str, tuple[str, ...]] = {
 """By the end of a column's name, `quality_elbow_angles`: the angles or the position that it tells of."""
 
 
+RETURNING = (
+    "where the shoulder's displacement ends or begins again, the shoulder goes there within two seconds "
+    "from where it was shown"
+)
+
+
 def qualities(
     n: int, rows: Sequence[tuple[int, Skeleton]], names: Iterable[str]
 ) -> dict[str, npt.NDArray[np.str_]]:
@@ -37,10 +43,11 @@ def assumptions(skeletons: Iterable[Skeleton]) -> dict[str, str]:
     found: dict[str, dict[str, None]] = {}
     for skeleton in skeletons:
         if "assumed" in skeleton.assumed.values():
-            text = _assumption(skeleton)
+            text, from_shoulder = _assumption(skeleton)
             for name in NAMES:
                 if _quality(skeleton, name) == "assumed":
-                    found.setdefault(name, {})[text] = None
+                    back = name.endswith("_position") and skeleton.assumed.get("shoulder") == "assumed"
+                    found.setdefault(name, {})[RETURNING if back and from_shoulder else text] = None
     return {name: "; ".join(texts) for name, texts in found.items()}
 
 
@@ -51,9 +58,10 @@ def _quality(skeleton: Skeleton, name: str) -> Quality | str:
     return ""
 
 
-def _assumption(skeleton: Skeleton) -> str:
+def _assumption(skeleton: Skeleton) -> tuple[str, bool]:
+    """Return what the set of known segments leaves to be assumed, and whether it shows the shoulder."""
     known = 0
     for bit, segment in zip((UPPER_ARM, FOREARM, HAND), arm_segments(skeleton.side), strict=True):
         pose = skeleton.segments.get(segment)
         known |= bit if pose is not None and pose.world_from_segment is not None else 0
-    return ASSUMPTION[known]
+    return ASSUMPTION[known], bool(known & UPPER_ARM)
