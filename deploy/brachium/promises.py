@@ -95,6 +95,8 @@ def _bench() -> Proof:
             figure("100 arms: poses held or missing", "1", *many, "poses_not_measured", at_most=0),
             figure("100 arms: fusion, of a core", "1", *many, "fusion_cpu", at_most=0.25),
             figure("100 arms: a bare relay, of a core", "1", *many, "relay_cpu"),
+            figure("shoulder smoother, a sample", "ms", "smoother", "smoother_ms", at_most=0.1),
+            figure("VQF offline of both sensors, a sample", "ms", "smoother", "vqf_ms"),
         ),
     )
 

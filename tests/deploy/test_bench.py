@@ -72,6 +72,6 @@ def test_the_table_names_every_figure():
         for name in bench.OneArm.__dataclass_fields__
         if name not in ("fusion_cpu_windows", "relay_cpu_windows")
     }
-    said = text({"one_arm": {"5": one, "1": one}})
+    said = text({"one_arm": {"5": one, "1": one}, "smoother": {"smoother_ms": 0.03, "vqf_ms": 0.002}})
     assert "% of a core" in said
-    assert said.count("\n") == 9
+    assert said.count("\n") == 12

@@ -17,6 +17,8 @@ from brachium.option_types import whole
 from brachium.shell import add_json, print_json
 
 WINDOW_S, QUICK_WINDOW_S = 6.0, 1.0
+SMOOTHED_WINDOWS = 10
+"""Windows in the recording that is smoothed."""
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
@@ -92,16 +94,19 @@ def _other(args: argparse.Namespace) -> int:
 
 def measure(window_s: float, arms: int) -> dict[str, Any]:
     """Return all figures: one arm by samples a packet, and many arms."""
-    from brachium import bench
+    from brachium import bench, bench_smoother
 
+    print("a shoulder, smoothed ...", file=sys.stderr, flush=True)
+    smoother = asdict(bench_smoother.measure(SMOOTHED_WINDOWS * window_s))
     one = {}
     for batch in (5, 1, 10):
         print(f"one arm, {batch} samples a packet ...", file=sys.stderr, flush=True)
         one[str(batch)] = asdict(bench.one_arm(batch, window_s))
     if not arms:
-        return {"one_arm": one}
+        return {"one_arm": one, "smoother": smoother}
     print(f"{arms} arms ...", file=sys.stderr, flush=True)
-    return {"one_arm": one, "many_arms": asdict(bench.many_arms(arms, window_s))}
+    many = asdict(bench.many_arms(arms, window_s))
+    return {"one_arm": one, "many_arms": many, "smoother": smoother}
 
 
 def text(figures: dict[str, Any]) -> str:
@@ -120,6 +125,9 @@ def text(figures: dict[str, Any]) -> str:
     for name, (label, factor) in rows.items():
         values = [factor * one[name] for one in figures["one_arm"].values()]
         lines.append(f"{label:<44}" + "".join(f"{value:>10.1f}" for value in values))
+    smoother = figures["smoother"]
+    lines += ["", f"{'shoulder smoother, ms a sample':<44}{smoother['smoother_ms']:>10.4f}"]
+    lines.append(f"{'VQF offline of both sensors, ms a sample':<44}{smoother['vqf_ms']:>10.4f}")
     many = figures.get("many_arms")
     if many is not None:
         lines += ["", f"{many['arms']} arms, 5 samples a packet, straight to the bus", ""]
