@@ -20,20 +20,19 @@ def open_serial(port: str) -> int:
     try:
         import termios
         import tty
-
+    except ImportError:
+        raise NotTold(
+            "serial lines are spoken to on Linux and macOS; else copy the file with mpremote"
+        ) from None
+    try:
         line = os.open(port, os.O_RDWR | os.O_NOCTTY)
         tty.setraw(line)
         about = termios.tcgetattr(line)
         about[4] = about[5] = termios.B115200
         termios.tcsetattr(line, termios.TCSANOW, about)
-    except ImportError:
-        raise NotTold(
-            "serial lines are only spoken to on Linux and macOS; copy the file with mpremote"
-        ) from None
     except (OSError, termios.error) as error:
-        raise NotTold(
-            f"{port} cannot be used: {error}; is the board plugged in, and no other program at it?"
-        ) from None
+        why = "is the board plugged in, and no other program at it?"
+        raise NotTold(f"{port} cannot be used: {error}; {why}") from None
     return line
 
 

