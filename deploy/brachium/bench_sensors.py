@@ -69,7 +69,9 @@ def measure(chips: int, steps: list[str] | None = None) -> SensorFigures:
         left["uncalibrated"].append(residuals(seed, SensorCalibration()))
         left["paper"].append(residuals(seed, as_in_the_paper(seed)))
         left["guided"].append(residuals(seed, found or SensorCalibration()))
-    refused = {mistake: guided(SEED, mistake).progress().refused for mistake in MISTAKES if mistake}
+    refused: dict[str, dict[str, str]] = {
+        mistake: guided(SEED, mistake).progress().refused for mistake in MISTAKES if mistake
+    }
     return SensorFigures(
         network=over_a_network(steps),
         chips=chips,
@@ -103,7 +105,7 @@ def over_a_network(steps: list[str] | None = None) -> NetworkFigures:
             again = network.info(infos)
     found = msgspec.convert(said["calibration"], SensorCalibration)
     return NetworkFigures(
-        steps=list(steps or ALL),
+        steps=[*(steps or ALL)],
         seconds=seconds,
         kept=said["kept"],
         kept_after_restart=again.kept,

@@ -7,14 +7,15 @@ from typing import Any
 
 from brachium import sensor_picture
 from brachium.shell import Failed, print_json
+from brachium_fusion import sensor_guide
 from brachium_wire import keys
 from brachium_wire.bus import Bus, Inbox
 from brachium_wire.codec import WireError, decode, decode_topic, encode
 from brachium_wire.messages import Answer, Calibration, Command, Info
 from brachium_wire.sensor_records import SensorProgress
 
-LONGEST_S = 1000.0
-"""Three attempts of each step in its longest time, and a little more."""
+LONGEST_S = sensor_guide.LONGEST_S + 60.0
+"""Fusion ends by itself before."""
 KEPT_WITHIN_S = 5.0
 """A node that keeps calibrations has said so long before."""
 LOOK_S = 0.1

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from brachium_body import rotation
+from brachium_body.segments import Segment
 from brachium_fusion import magnetometer_calibration as magnetometer
 from brachium_fusion import sensor_calibration as fits
 from brachium_fusion.calibrated import Calibrated
@@ -17,7 +18,7 @@ from brachium_nodes.wearer import Wearer, WearerSettings
 from brachium_wire.messages import Info, SensorCalibration
 from brachium_wire.samples import Samples
 
-SEGMENT = "forearm_r"
+SEGMENT: Segment = "forearm_r"
 RATE_HZ = 100.0
 DIRECTIONS = 500
 

@@ -6,7 +6,7 @@ import msgspec
 import numpy as np
 
 from brachium_fusion.sensor_calibration import Refused, SensorFit
-from brachium_fusion.sensor_steps import Faces, Motion, Rest, Step
+from brachium_fusion.sensor_steps import Faces, Motion, Rest
 from brachium_fusion.sphere_coverage import text_of
 from brachium_fusion.turn_step import Turn
 from brachium_wire import calibration_file
@@ -14,7 +14,8 @@ from brachium_wire.messages import Info, SensorCalibration
 from brachium_wire.samples import Samples
 from brachium_wire.sensor_records import SensorProgress, SensorStep
 
-STEPS: dict[SensorStep, type[Rest] | type[Faces] | type[Turn]] = {"rest": Rest, "faces": Faces, "turn": Turn}
+Step = Rest | Faces | Turn
+STEPS: dict[SensorStep, type[Step]] = {"rest": Rest, "faces": Faces, "turn": Turn}
 ALL: tuple[SensorStep, ...] = get_args(SensorStep)
 TRIES = 3
 """A step that is refused so often is given up; what the others find holds."""
@@ -22,13 +23,14 @@ LOOK_S = 0.2
 DRIFT_DPS = 0.3
 """Between the first rest and the last face: six times what is left of a bias after a good rest."""
 LONGEST_S = TRIES * sum(step.longest_s for step in STEPS.values())
+"""All steps take no longer, whatever is done."""
 
 
 def steps_for(asked: list[SensorStep] | None, info: Info) -> list[SensorStep]:
     """Return the steps to do, in order. Raises ValueError for what this sensor cannot do."""
     if info.orientation_only:
         raise ValueError("the sensor gives orientation only: it calibrates itself")
-    steps = [step for step in ALL if asked is None or step in asked]
+    steps: list[SensorStep] = [step for step in ALL if asked is None or step in asked]
     if not info.magnetometer and "turn" in steps:
         if asked is not None:
             raise ValueError("turn is for magnetometers; this sensor has none")

@@ -1,10 +1,11 @@
 """The steps of a sensor's calibration while they go on: what was seen, what is still wanted. Pure.
 
-Each takes samples as the chip gives them and is looked at some times a second; then it says what to do, that
-it has found its fit, or why it gives up. turn_step.py has the magnetometer's.
+Each takes samples as the chip gives them and is looked at some times a second: a look says what to do, or
+what was found, or raises Refused. `too_late` says why it found nothing in its `longest_s`. turn_step.py has
+the magnetometer's.
 """
 
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 
@@ -55,22 +56,6 @@ class Seen(NamedTuple):
     still: bool = False
     left_s: float = 0.0
     found: SensorFit | None = None
-
-
-class Step(Protocol):
-    """One step. It is over when a look finds something, or raises Refused."""
-
-    part: Part
-    longest_s: float
-
-    def take(self, samples: Motion) -> None:
-        """Take samples."""
-
-    def look(self) -> Seen:
-        """Say how far it is. Raises Refused."""
-
-    def too_late(self) -> str:
-        """Return why it found nothing in its longest time."""
 
 
 class Tail:

@@ -53,7 +53,8 @@ def run(settings: EmulateSettings, mistake: Mistake, stop: Event) -> EmulateRepo
 
 class _Bench:
     def __init__(self, settings: EmulateSettings, mistake: Mistake, bus: Bus, stop: Event) -> None:
-        self._settings, self._mistake, self._bus, self._stop = settings, mistake, bus, stop
+        self._settings, self._bus, self._stop = settings, bus, stop
+        self._mistake: Mistake = mistake
         (self._subject,) = settings.subjects()
         self._timeline = Timeline(settings.speed)
         self._heart = Heart(bus, settings.room, "emulate", settings.id)
