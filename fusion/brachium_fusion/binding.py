@@ -85,6 +85,13 @@ class Binding:
                 result[segment] = reading._replace(quality="disturbed")
         return Bound(result, shifts, slips)
 
+    def heading_sd(self, side: Side) -> tuple[float | None, float | None]:
+        """Return the standard deviation of the heading across elbow and wrist, rad; None: not estimated."""
+        if side not in self._arms:
+            return None, None
+        arm = self._arms[side][1]
+        return arm.heading_sd("elbow"), arm.heading_sd("wrist")
+
     def _motions(self, now: int, readings: Readings, known: Known) -> dict[str, Motion]:
         """Return the motion of every raw sensor that is there, and note who is still."""
         motions = {}

@@ -76,6 +76,11 @@ class JointFilter:
         """The model's at the last node, in the given world."""
         self._heading, self._heading_sd, self._residual = 0.0, pi, 0.0
 
+    @property
+    def heading_sd_rad(self) -> float:
+        """Standard deviation of the heading between a and b as it is now; pi while nothing is known."""
+        return self._heading_sd
+
     def step(
         self,
         world_from_a: Floats,

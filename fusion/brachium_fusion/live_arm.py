@@ -6,6 +6,7 @@ Two sensors on one joint know more together. Corrections are turns from the left
 
 from collections.abc import Mapping
 from itertools import pairwise
+from math import pi
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -83,6 +84,11 @@ class LiveArm:
             return ()
         trunk = () if self._trunk is None else ("sternum",)
         return (*trunk, self._upper, self._forearm, self._hand)
+
+    def heading_sd(self, joint: str) -> float | None:
+        """Return the standard deviation of the heading across `elbow` or `wrist`, rad; None: unknown."""
+        found = self._joints.get(joint)
+        return found.heading_sd_rad if found is not None and found.heading_sd_rad < pi else None
 
     def step(self, now: int, sensors: Mapping[str, SensorNow], rests: Mapping[str, RestMean]) -> ArmNow:
         """Return what the joints tell at an instant, of the sensors that are there."""

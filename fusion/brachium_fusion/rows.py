@@ -40,6 +40,8 @@ class Row(NamedTuple):
     frame: "Frame"
     withhold_heading: bool
     shift: Shift | None = None
+    heading_sd: tuple[float | None, float | None, float | None] = (None, None, None)
+    """rad, of shoulder, elbow and wrist; None where nothing tells it."""
 
 
 def rows_of(subject_id: str, subject: Subject, instant: Instant) -> list[Row]:
@@ -57,10 +59,11 @@ def rows_of(subject_id: str, subject: Subject, instant: Instant) -> list[Row]:
                 for slot, reading, aligned in zip(slots, readings, frame.aligned, strict=True)
             ]
         )
-        uncertain = False
+        uncertain, shoulder_sd = False, None
         if frame.drifts:
             age_s = 1e-9 * (instant.time_ns - subject.calibrating.reference_ns)
-            uncertain = HEADING_SD_DEG + HEADING_DRIFT_DEG_S * age_s > WITHHOLD_DEG
+            sd_deg = HEADING_SD_DEG + HEADING_DRIFT_DEG_S * age_s
+            uncertain, shoulder_sd = sd_deg > WITHHOLD_DEG, radians(sd_deg)
         rows.append(
             Row(
                 subject_id,
@@ -72,6 +75,7 @@ def rows_of(subject_id: str, subject: Subject, instant: Instant) -> list[Row]:
                 frame,
                 uncertain,
                 instant.shifts.get(side),
+                (shoulder_sd, *subject.binding.heading_sd(side)),
             )
         )
     return rows

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from functools import lru_cache
+from math import hypot, radians
 from typing import NamedTuple
 
 import numpy as np
@@ -27,6 +28,13 @@ _RANK: dict[Quality, int] = {
 """The worse quality wins where several segments meet; `held` tells more about now than how it was aligned."""
 
 
+TILT_SD = radians(1.0)
+"""Of an angle by the tilt of its sensors in movement: a working assumption (docs/conventions.md)."""
+_CLINICAL = (
+    ("shoulder_flexion", "shoulder_abduction", "shoulder_rotation"),
+    ("elbow_flexion", "forearm_pronation"),
+    ("wrist_flexion", "wrist_deviation"),
+)
 _GOOD: frozenset[Quality | None] = frozenset({"good", None})
 _NEEDS: dict[str, tuple[int, ...]] = {
     **dict.fromkeys(SHOULDER, (0, 1)),
@@ -92,9 +100,23 @@ def messages(
                 shoulder_shift=None if moved is None else _three(moved[0]),
                 shoulder_shift_sd=None if moved is None else _three(moved[1]),
                 received_ns=row.received_ns,
+                angle_sd=_deviations(row.heading_sd, given),
             )
         )
     return skeletons
+
+
+def _deviations(heading_sd: tuple[float | None, ...], given: dict[str, float]) -> dict[str, float]:
+    """Return the standard deviations of clinical angles whose heading is known so well, rad.
+
+    A heading may turn an angle by all of itself, or less: this is the most.
+    """
+    result: dict[str, float] = {}
+    for names, sd in zip(_CLINICAL, heading_sd, strict=True):
+        if sd is not None:
+            whole = hypot(TILT_SD, sd)
+            result |= {name: whole for name in names if name in given}
+    return result
 
 
 def _poses(row: Row, sensors: list[list[float]], segments: list[list[float]]) -> dict[str, SegmentPose]:

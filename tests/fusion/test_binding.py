@@ -92,6 +92,17 @@ def test_the_joint_keeps_the_heading_between_two_sensors_that_drift(made, drawin
     assert errors[0] > 9.0
     assert errors[1] < 5.0
     assert errors[1] < errors[2] + 1.0  # what is left comes from the mounting, which a pose alone gives
+    told = {name: np.degrees(sd) for name, sd in bound.skeletons[-1].angle_sd.items()}
+    assert told.keys() == {
+        "shoulder_flexion",
+        "shoulder_abduction",
+        "shoulder_rotation",
+        "elbow_flexion",
+        "forearm_pronation",
+    }
+    assert 1.0 < told["elbow_flexion"] == told["forearm_pronation"] < 6.0
+    assert 2.0 < told["shoulder_flexion"] < 4.0  # after a pose, and drifting since
+    assert alone.skeletons[-1].angle_sd.keys() == set(list(told)[:3])  # nobody estimates the elbow's
 
 
 def test_other_filters_stay_as_they_were_published(made, drawing) -> None:
