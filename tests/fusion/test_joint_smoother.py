@@ -14,10 +14,10 @@ from brachium_fusion.joint_smoother import smooth_joint
 
 RATE = 50.0
 DATA = Path(os.environ.get("BRACHIUM_DATA", Path(__file__).parents[3] / "shared" / "data"))
-RECORDINGS = ("1D_02", "2D_03", "3D_03")
-"""One of each number of axes."""
-ROWS = 2000
-"""The first 40 s tell enough."""
+RECORDINGS = ("1D_02", "1D_03", "2D_01", "2D_03", "3D_01", "3D_03")
+"""All six, whole: two of each number of axes."""
+LIVE_DEG, BEST_DEG = 1.7, 1.52
+"""Means of what is reached here, with a twentieth to spare; promised are 2.1 and 1.9."""
 
 
 def smooth(motion, angle, joint=None, shared=False, rate=RATE):
@@ -125,12 +125,12 @@ def test_real_recordings_without_any_heading():
         sensors, given, true = [], [], []
         for segment in segments:
             gyr, acc = (
-                columns(folder / f"{segment}.parquet", names)[:ROWS]
+                columns(folder / f"{segment}.parquet", names)
                 for names in (("gx", "gy", "gz"), ("ax", "ay", "az"))
             )
             sensors.append((gyr, acc))
             given.append(VQF(1.0 / RATE).updateBatch(gyr, acc)["quat6D"])
-            true.append(columns(folder / "truth.parquet", [f"{segment}_sensor_q{c}" for c in "wxyz"])[:ROWS])
+            true.append(columns(folder / "truth.parquet", [f"{segment}_sensor_q{c}" for c in "wxyz"]))
         given[1] = rotation.multiply(rotation.about(2, 2.0), given[1])
         tracker = JointFilter(joint, RATE)
         streams = *given, sensors[0][0], sensors[1][0], sensors[0][1], sensors[1][1]
@@ -138,8 +138,8 @@ def test_real_recordings_without_any_heading():
         live.append(lagged_rms([e.world_from_a for e in steps], [e.world_from_b for e in steps], true, 750))
         found = smooth_joint(joint, RATE, *sensors, *given)
         best.append(lagged_rms(found.world_from_a, found.world_from_b, true, 0))
-    assert np.mean(live) < 1.47, f"{np.round(live, 2)}"
-    assert np.mean(best) < 1.26, f"{np.round(best, 2)}"
+    assert np.mean(live) < LIVE_DEG, f"{np.round(live, 2)}"
+    assert np.mean(best) < BEST_DEG, f"{np.round(best, 2)}"
 
 
 def lagged_rms(a, b, true, first):
