@@ -293,5 +293,5 @@ def test_a_controller_that_left_the_bus_is_counted():
         wire.send(can.Message(arbitration_id=0x04, is_error_frame=True, data=bytes(8)))
         wire.send(can.Message(arbitration_id=0x04, is_remote_frame=True))
         assert [port.receive(1.0) for _ in range(3)] == [None, None, None]
-    assert port.counts == {"bus_off": 1, "error_frames": 1, "remote_frames": 1}
+    assert +port.counts == {"bus_off": 1, "error_frames": 1, "remote_frames": 1}
     port.close()

@@ -1,20 +1,22 @@
 """One sensor on the bus: its frames in, batches for its segment out. Pure: bytes and times are arguments."""
 
 from collections import Counter
+from itertools import chain
+from math import hypot
 from struct import pack
-from typing import Any
-
-import numpy as np
 
 from brachium_nodes.batch_blocks import Measured
 from brachium_nodes.can.grouping import Grouper, Sample, Values
 from brachium_nodes.can.map_files import Quantity
 from brachium_nodes.can.sensor_map import CanSensor
+from brachium_nodes.can.signals import Read, ShortFrame, reader
 from brachium_nodes.sample_stream import Memory, SegmentMemory, stamp
-from brachium_wire.codec import WireError
+from brachium_wire.codec import Drop, WireError
 from brachium_wire.messages import Info, SampleBatch, SensorCalibration, Status
 from brachium_wire.samples import read_samples
 
+Part = tuple[Quantity, tuple[str, ...], float]
+"""A quantity, its signals, and what makes SI of them."""
 GONE_NS = 3_000_000_000
 """A sensor that was silent for so long is not connected; the status topic is stale after as long."""
 HOLD_NS = 100_000_000
@@ -31,7 +33,7 @@ class CanImu:
         self.raw = {"acceleration", "angular_rate"} <= quantities.keys()
         """Whether it delivers what it measures; else its orientation."""
         used: list[Quantity] = ["acceleration", "angular_rate", "field"] if self.raw else ["quaternion"]
-        self._parts: dict[str, list[tuple[Quantity, tuple[str, ...], float]]] = {}
+        self._parts: dict[str, list[Part]] = {}
         for name in used:
             if (signals := quantities.get(name)) is not None:
                 row = self._parts.setdefault(signals.message, [])
@@ -44,6 +46,7 @@ class CanImu:
             optional = frozenset(self._parts) - required
             keyed = sensor.before is None
             self._grouper = Grouper(sensor.key, frozenset(required), optional, keyed=keyed)
+        self._reads = _readers(sensor, self._parts)
         self._memory, self._place = Memory(boot=0), SegmentMemory()
         self._restarts = 0
         self._first: float | None = None
@@ -54,27 +57,25 @@ class CanImu:
         self.drops: Counter[str] = Counter()
         self._counted, self._counted_ns = 0, 0
 
-    def receive(self, message: Any, data: bytes, now_ns: int) -> list[SampleBatch]:
-        """Take a frame of this sensor that came at host time `now_ns`; `message` is its DBC's."""
-        sensor, name = self.sensor, message.name
-        key_signal = None if sensor.map.key is None else sensor.map.key.signals.get(name)
-        parts = self._parts.get(name)
-        if parts is None and key_signal is None:
+    def receive(self, message: str, data: bytes | bytearray, now_ns: int) -> list[SampleBatch]:
+        """Take a frame of this sensor that came at host time `now_ns`; `message` is its DBC's name."""
+        read = self._reads.get(message)
+        if read is None:
             return []  # measured, and not asked for
         try:
-            signals = message.decode(data, decode_choices=False)
-            values = () if parts is None else _values(signals, parts)
-        except Exception:  # cantools: a frame that is too short, and whatever foreign bytes make it raise
+            values = read(data)
+        except ShortFrame:
             self.drops["bad_frame"] += 1
             return []
         if self._grouper is None:
-            return self._take(Sample(self._next, now_ns, {name: values}), now_ns)
-        if name == sensor.before:
-            samples = self._grouper.key(float(signals[key_signal]), now_ns)
+            return self._take(Sample(self._next, now_ns, {message: values}), now_ns)
+        if message == self.sensor.before:
+            samples = self._grouper.key(values[0], now_ns)
+        elif self.sensor.before is None:
+            samples = self._grouper.member(message, values[1:], now_ns, values[0])
         else:
-            number = None if key_signal is None else float(signals[key_signal])
-            samples = self._grouper.member(name, values, now_ns, number)
-        return [batch for sample in samples for batch in self._take(sample, now_ns)]
+            samples = self._grouper.member(message, values, now_ns)
+        return [batch for sample in samples for batch in self._take(sample, now_ns)] if samples else []
 
     def tick(self, now_ns: int) -> list[SampleBatch]:
         """Give up what waits in vain, and send what waits for its batch to fill."""
@@ -159,7 +160,11 @@ class CanImu:
             return []
         device_us = [us for _, us, _ in waiting]
         offsets = pack(f"<{len(waiting)}I", *(us - device_us[0] for us in device_us))
-        blocks, rows = self._blocks([sample for _, _, sample in waiting])
+        try:
+            blocks, rows = self._blocks([sample for _, _, sample in waiting])
+        except OverflowError:  # a float of 64 bits beyond those of 32
+            self.drops[Drop.OUT_OF_RANGE.value] += len(waiting)
+            return []
         batch = SampleBatch(
             sequence=waiting[0][0],
             time_ns=1,
@@ -188,25 +193,35 @@ class CanImu:
         rows: bytes | None = None
         for message, parts in self._parts.items():
             having = [i for i, sample in enumerate(samples) if message in sample.members]
-            if not having:
-                continue
-            table, column = np.array([samples[i].members[message] for i in having]), 0
+            values, column = [samples[i].members[message] for i in having], 0
             for name, signals, _ in parts:
-                block = table[:, column : column + len(signals)]
-                column += len(signals)
+                begin, column = column, column + len(signals)
+                block = [row[begin:column] for row in values]
                 if name == "quaternion":
-                    block = self._unit(block)
-                blocks[name] = block.astype("<f4").tobytes()
-                if name == "field" and len(having) < len(samples):
-                    rows = np.array(having, dtype="<u2").tobytes()
+                    block = [self._unit(row) for row in block]
+                if block:
+                    blocks[name] = pack(f"<{len(block) * len(signals)}f", *chain.from_iterable(block))
+                if block and name == "field" and len(having) < len(samples):
+                    rows = pack(f"<{len(having)}H", *having)
         return blocks, rows
 
-    def _unit(self, quaternions: np.ndarray[Any, np.dtype[np.float64]]) -> Any:
-        """Return them of length 1 (16 bits leave a ten-thousandth), world from sensor."""
-        length = np.linalg.norm(quaternions, axis=1, keepdims=True)
-        whole = np.where(np.abs(length - 1.0) < 0.01, quaternions / np.maximum(length, 1e-9), quaternions)
-        return whole * np.array([1.0, -1.0, -1.0, -1.0]) if self._inverse else whole
+    def _unit(self, q: Values) -> Values:
+        """Return a quaternion of length 1 (16 bits leave a ten-thousandth), world from sensor."""
+        length = hypot(*q)
+        if abs(length - 1.0) > 0.01:
+            return q  # none: refused with its batch
+        turn = -1.0 if self._inverse else 1.0
+        return q[0] / length, turn * q[1] / length, turn * q[2] / length, turn * q[3] / length
 
 
-def _values(signals: dict[str, Any], parts: list[tuple[Quantity, tuple[str, ...], float]]) -> Values:
-    return tuple(scale * float(signals[name]) for _, names, scale in parts for name in names)
+def _readers(sensor: CanSensor, parts: dict[str, list[Part]]) -> dict[str, Read]:
+    """Return what reads each message: its key, where each carries it, and its quantities in SI."""
+    key = {} if sensor.map.key is None else sensor.map.key.signals
+    reads: dict[str, Read] = {}
+    for message in sensor.messages.values():
+        wanted = [(key[message.name], 1.0)] if message.name in key else []
+        for _, names, scale in parts.get(message.name, ()):
+            wanted += [(name, scale) for name in names]
+        if wanted:
+            reads[message.name] = reader(message, wanted)
+    return reads

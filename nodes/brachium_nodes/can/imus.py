@@ -40,7 +40,9 @@ class CanImus:
         self._news = CalibrationNews(bus, room, self._known)
         self._imus = [CanImu(sensor, batch) for sensor in sensors]
         self._by_id = {
-            number: (imu, message) for imu in self._imus for number, message in imu.sensor.messages.items()
+            number: (imu, message.name)
+            for imu in self._imus
+            for number, message in imu.sensor.messages.items()
         }
         self._tokens: dict[str, Callable[[], None]] = {}
         self._status_ns = 0
@@ -49,7 +51,7 @@ class CanImus:
         self.drops: Counter[str] = Counter()
         self.counts: Counter[str] = Counter()
 
-    def receive(self, number: int, data: bytes, now_ns: int) -> None:
+    def receive(self, number: int, data: bytes | bytearray, now_ns: int) -> None:
         """Take a frame that came at host time `now_ns`; bit 31 of `number` stands for 29 bits."""
         found = self._by_id.get(number)
         if found is None:

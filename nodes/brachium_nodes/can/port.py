@@ -56,7 +56,8 @@ class Port:
         """Open it. Raises NoInterface when that fails, ModuleNotFoundError without the extra `can`."""
         self._settings = settings
         self._bus: Any = None
-        self.counts: Counter[str] = Counter()
+        self._counts: Counter[str] = Counter()
+        self._taken = 0  # counted so often that a dict would show
         self._pause_s, self._due_s = FIRST_PAUSE_S, 0.0
         self._said = ""
         reason = self._open()
@@ -64,11 +65,16 @@ class Port:
             raise NoInterface(reason)
 
     @property
+    def counts(self) -> Counter[str]:
+        """What it did, by name."""
+        return self._counts + Counter(frames_in=self._taken)
+
+    @property
     def there(self) -> bool:
         """Whether the interface is open."""
         return self._bus is not None
 
-    def receive(self, timeout_s: float) -> tuple[int, bytes] | None:
+    def receive(self, timeout_s: float) -> tuple[int, bytes | bytearray] | None:
         """Return the next data frame's id (bit 31 set for 29 bits) and bytes, or None after `timeout_s`."""
         if self._bus is None and not self._reopened():
             time.sleep(min(timeout_s, max(self._due_s - time.monotonic(), 0.0)))
@@ -80,20 +86,17 @@ class Port:
             return None
         if frame is None:
             return None
-        if frame.is_error_frame:
-            self._error_frame(frame)
+        if frame.is_error_frame or frame.is_remote_frame:
+            self._no_data(frame)
             return None
-        if frame.is_remote_frame:
-            self.counts["remote_frames"] += 1
-            return None
-        self.counts["frames_in"] += 1
+        self._taken += 1
         number = frame.arbitration_id | (EXTENDED if frame.is_extended_id else 0)
-        return number, bytes(frame.data)
+        return number, frame.data
 
     def send(self, number: int, data: bytes, *, fd: bool = False) -> bool:
         """Send a frame; return whether the interface took it."""
         if self._bus is None and not self._reopened():
-            self.counts["not_sent"] += 1
+            self._counts["not_sent"] += 1
             return False
         import can
 
@@ -109,7 +112,7 @@ class Port:
             assert self._bus is not None
             self._bus.send(frame, timeout=0)
         except can.CanOperationError as error:
-            self.counts["not_sent"] += 1
+            self._counts["not_sent"] += 1
             if "buffer" in str(error).lower():  # nobody acknowledges, or the bus is full: it stays open
                 self._say(
                     f"{self.name}: frames are not taken: is another node there, and the bit rate right?"
@@ -118,10 +121,10 @@ class Port:
                 self._lost(error)
             return False
         except Exception as error:
-            self.counts["not_sent"] += 1
+            self._counts["not_sent"] += 1
             self._lost(error)
             return False
-        self.counts["frames_out"] += 1
+        self._counts["frames_out"] += 1
         return True
 
     @property
@@ -166,23 +169,25 @@ class Port:
             return False
         log.warning("%s is there again", self.name)
         self._said, self._pause_s = "", FIRST_PAUSE_S
-        self.counts["interface_back"] += 1
+        self._counts["interface_back"] += 1
         return True
 
     def _lost(self, error: Exception) -> None:
-        self.counts["interface_gone"] += 1
+        self._counts["interface_gone"] += 1
         self._say(f"{self.name} is gone: {_line(error)}; {self._to_do()}")
         self.close()
         self._due_s = time.monotonic() + self._pause_s
 
-    def _error_frame(self, frame: Any) -> None:
-        if frame.arbitration_id & BUS_OFF:
-            self.counts["bus_off"] += 1
+    def _no_data(self, frame: Any) -> None:
+        if frame.is_remote_frame:
+            self._counts["remote_frames"] += 1
+        elif frame.arbitration_id & BUS_OFF:
+            self._counts["bus_off"] += 1
             self._say(
                 f"{self.name}: the controller left the bus (bus-off): check wiring, termination, bit rate"
             )
         else:
-            self.counts["error_frames"] += 1
+            self._counts["error_frames"] += 1
 
     def _say(self, text: str) -> None:
         if text != self._said:

@@ -14,7 +14,7 @@ from brachium_nodes.can.sensor_map import CanSensor, read_sensors
 from brachium_nodes.host_claim import checked_host
 from brachium_wire import keys
 from brachium_wire.bus import DEFAULT_ENDPOINT, Bus
-from brachium_wire.heart import Heart
+from brachium_wire.heart import BEAT_S, Heart
 from brachium_wire.hosttime import HostClock, tell_host_time
 from brachium_wire.messages import Origin
 
@@ -83,20 +83,21 @@ class _Service:
             )
 
         self._sender: ArmSender | None = None
-        self._send_s = 0.0
+        self._send_s = self._beat_s = 0.0
         if table is not None:
             self._sender = ArmSender(bus, settings.room, table, settings.origins, fd=settings.port.fd)
             self._send_s = 1.0 / table.rate_hz
 
     def run(self, stop: threading.Event) -> None:
         """Take frames as they come; look after everything else at its time."""
-        look_s = send_s = time.monotonic()
+        look_s = send_s = now_s = time.monotonic()
         while not stop.is_set():
             due_s = look_s if self._sender is None else min(look_s, send_s)
-            frame = self._port.receive(max(due_s - time.monotonic(), 0.0))
+            frame = self._port.receive(max(due_s - now_s, 0.0))
+            now_ns = time.monotonic_ns()
+            now_s = 1e-9 * now_ns
             if frame is not None and self._imus is not None:
-                self._imus.receive(*frame, self._clock.now_ns())
-            now_s = time.monotonic()
+                self._imus.receive(*frame, self._clock.at(now_ns))
             if self._sender is not None and now_s >= send_s:
                 self._sender.tick(self._port)
                 send_s = max(send_s + self._send_s, now_s)  # late frames are left out, not caught up
@@ -108,20 +109,22 @@ class _Service:
     def _look(self) -> None:
         if self._imus is not None:
             self._imus.tick(self._clock.now_ns())
-        self._beat()
+        if time.monotonic() >= self._beat_s:
+            self._beat()
 
     def _end(self) -> None:
         if self._imus is not None:
             self._imus.close(self._clock.now_ns())
         if self._sender is not None:
             self._sender.close()
-        self._beat(now=True)
+        self._beat()
 
-    def _beat(self, *, now: bool = False) -> None:
+    def _beat(self) -> None:
+        self._beat_s = time.monotonic() + BEAT_S
         heart = self._heart
         for part in (self._port, self._imus, self._sender):
             if part is not None:
                 heart.counts |= part.counts
                 if not isinstance(part, Port):
                     heart.drops |= part.drops
-        heart.beat(now=now)
+        heart.beat(now=True)
