@@ -32,6 +32,7 @@ from brachium_fusion.pose import (
 )
 from brachium_fusion.segment_frames import ElbowPose
 from brachium_fusion.segment_records import SensorRecord, Span, SpanKind, check, held_pose, rows_of
+from brachium_fusion.swapped_sensors import swapped
 
 __all__ = ["SensorRecord", "Span", "SpanKind", "align_segments"]
 
@@ -222,5 +223,8 @@ def _joined(
         scores=scores,
         joints={f"elbow_{side[0]}": found.joint for side, found in elbows.items()},
         refused=refused,
-        warnings=warnings_for(base.forward, heading, assumed, tied, scores),
+        warnings=(
+            *warnings_for(base.forward, heading, assumed, tied, scores),
+            *swapped(records, spans),
+        ),
     )
