@@ -67,6 +67,7 @@ def found(data: dict[str, Any], kept: str) -> list[str]:
                 "gateway": "kept by the gateway: this node's program does not keep calibrations",
             }.get(kept, "no gateway has taken it yet: the node gets it when it joins one of this room")
         )
+        lines.append("once it is worn: brachium calibrate, without --sensor")
     return lines
 
 

@@ -71,6 +71,29 @@ def test_six_faces_and_any_poses_find_scale_and_bias(seed: int) -> None:
     assert free.scores["residual_m_s2"] < 0.01
 
 
+@given(st.integers(0, 1000))
+@settings(max_examples=10)
+def test_six_laid_faces_give_scale_and_bias_however_they_are_tilted(seed: int) -> None:
+    random = np.random.default_rng(seed)
+    scale, bias = 1.0 + 0.02 * random.normal(size=3), 0.3 * random.normal(size=3)
+    axes = random.normal(size=(6, 3))
+    tilts = np.radians(12.0) * axes / np.linalg.norm(axes, axis=1, keepdims=True)
+    poses = fit.still_poses(
+        *held(Rotation.from_rotvec(tilts).apply(FACES), scale, bias, np.zeros(3), seed), RATE
+    )
+    laid = fit.accel_laid_faces(poses).calibration
+    assert laid.accel_scale == pytest.approx(tuple(scale), abs=2e-3)
+    assert laid.accel_bias == pytest.approx(tuple(bias), abs=0.03)
+
+
+def test_faces_on_which_the_sensor_was_pushed_are_no_faces() -> None:
+    poses = GRAVITY * FACES * np.array([[1.3, 1, 1]] * 6)
+    with pytest.raises(Refused, match="no accelerometer errs by 23 %"):
+        fit.accel_laid_faces(poses)
+    assert fit.face_of(poses[0]) == "+x"
+    assert fit.face_of(np.array([5.0, 5.0, 5.0])) == ""
+
+
 def test_faces_laid_down_badly_spoil_faces_and_not_poses() -> None:
     """Ten degrees off a face lose 1.5 % of gravity: six faces take it for scale, the ellipsoid does not."""
     tilt = Rotation.from_rotvec(np.radians(10.0) * np.array([[0.7, 0.7, 0.1]] * 6)).apply(FACES)
