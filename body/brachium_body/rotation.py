@@ -113,6 +113,22 @@ def to_matrix(q: npt.ArrayLike) -> Array:
     return entries.reshape(*w.shape, 3, 3)
 
 
+def _cross_rule() -> Array:
+    rule = np.zeros((3, 3, 3))
+    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+        rule[i, k, j], rule[i, j, k] = 1.0, -1.0
+    return rule.reshape(3, 9)
+
+
+_CROSS: Array = _cross_rule()
+
+
+def cross_matrix(v: npt.ArrayLike) -> Array:
+    """Return the matrices (..., 3, 3) whose product with x is v x x, of v (..., 3)."""
+    v = np.asarray(v, dtype=np.float64)
+    return (v @ _CROSS).reshape(*v.shape, 3)
+
+
 def from_matrix(matrix: npt.ArrayLike) -> Array:
     """Return unit quaternions (..., 4), w >= 0, of rotation matrices (..., 3, 3).
 

@@ -160,12 +160,5 @@ def _loss(residual: Floats) -> Floats:
 
 def _turning(rate: Floats, spin: Floats) -> Floats:
     """Return [alpha x] + [w x][w x] (n, 3, 3) of rates and angular accelerations (n, 3)."""
-    across = _skew(rate)
-    return _skew(spin) + across @ across
-
-
-def _skew(v: Floats) -> Floats:
-    zero = np.zeros(len(v))
-    x, y, z = v.T
-    rows = [np.stack(r, axis=-1) for r in ((zero, -z, y), (z, zero, -x), (-y, x, zero))]
-    return np.stack(rows, axis=-2).astype(np.float64)
+    across = rotation.cross_matrix(rate)
+    return rotation.cross_matrix(spin) + across @ across

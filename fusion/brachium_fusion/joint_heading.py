@@ -10,7 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from brachium_fusion.joint_matrices import Floats, skew
+from brachium_body import rotation
+from brachium_fusion.joint_matrices import Floats
 from brachium_fusion.joint_model import Interval, Joint
 from brachium_fusion.joint_update import GRAVITY
 
@@ -76,8 +77,8 @@ class HeadingSearch:
             bend = 2.0 - 2.0 * products[2]
         else:
             # normal a x b: its product with rate_b is a (b x rate_b), with rate_a (rate_a x a) b
-            across = _turning(a, skew(b) @ rate_b)
-            against = _turning(skew(rate_a) @ a, b)
+            across = _turning(a, rotation.cross_matrix(b) @ rate_b)
+            against = _turning(rotation.cross_matrix(rate_a) @ a, b)
             dot, along = (
                 np.array([_turning(a, b), [x - y for x, y in zip(across, against, strict=True)]]) @ _TERMS
             )
@@ -127,7 +128,9 @@ def centre_acceleration(
 ) -> Floats:
     """Return the joint centre's mean acceleration (..., 2, 3) over an interval as each sensor saw it, each in
     its own world: from world_from_sensor (..., 2, 3, 3) and rates (..., 2, 3) at both ends."""
-    lever = skew(np.array([np.zeros(3) if v is None else v for v in (joint.lever_a, joint.lever_b)]))
+    lever = rotation.cross_matrix(
+        np.array([np.zeros(3) if v is None else v for v in (joint.lever_a, joint.lever_b)])
+    )
     gained = start @ (lever @ rate_start[..., None]) - end @ (lever @ rate_end[..., None])
     acceleration: Floats = ((start @ interval.push[..., None] + gained) / interval.span_s)[..., 0]
     acceleration[..., 2] -= GRAVITY

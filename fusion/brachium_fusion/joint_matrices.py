@@ -12,13 +12,6 @@ import numpy.typing as npt
 Floats = npt.NDArray[np.float64]
 
 
-def _skew_rule() -> Floats:
-    rule = np.zeros((3, 3, 3))
-    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
-        rule[i, k, j], rule[i, j, k] = 1.0, -1.0
-    return rule.reshape(3, 9)
-
-
 def _matrix_rule() -> Floats:
     """Return (16, 9): a matrix's entries by the products of a unit quaternion's components."""
     rule = np.zeros((4, 4, 3, 3))
@@ -32,12 +25,7 @@ def _matrix_rule() -> Floats:
     return rule.reshape(16, 9)
 
 
-_SKEW, _MATRIX = _skew_rule(), _matrix_rule()
-
-
-def skew(v: Floats) -> Floats:
-    """Return the matrices (..., 3, 3) whose product with x is v x x."""
-    return (v @ _SKEW).reshape(*v.shape, 3)
+_MATRIX = _matrix_rule()
 
 
 def matrix_of(q: Floats) -> Floats:

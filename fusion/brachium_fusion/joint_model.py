@@ -19,7 +19,8 @@ from typing import Any
 
 import numpy as np
 
-from brachium_fusion.joint_matrices import Floats, headings, matrix_of, skew, turn_by, vector_of
+from brachium_body import rotation
+from brachium_fusion.joint_matrices import Floats, headings, matrix_of, turn_by, vector_of
 
 NODE_S = 0.08
 """Constraints are applied this often: twice as often as the arm's fastest movements need."""
@@ -211,7 +212,7 @@ def resume(joint: Joint, state: JointState, attitude: Floats, gyr: Floats, headi
 
 def _velocity_at_rest(attitude: Floats, rate: Floats, lever: Floats) -> Floats:
     """Return the sensors' velocities (2, 3) while the joint centre rests."""
-    moved: Floats = attitude @ (skew(lever) @ rate[:, :, None])
+    moved: Floats = attitude @ (rotation.cross_matrix(lever) @ rate[:, :, None])
     return moved[:, :, 0]
 
 

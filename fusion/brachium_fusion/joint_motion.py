@@ -7,6 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from brachium_body import rotation
+from brachium_fusion.still_stretches import runs
 
 Floats = npt.NDArray[np.float64]
 
@@ -82,7 +83,7 @@ def joint_motion(
     step = max(1, round(rate_hz / ROWS_HZ), int(np.ceil(inside.sum() / MOST_ROWS)))
     kept = [np.zeros(0, dtype=np.intp)]
     columns = [np.zeros((0, 18))]
-    for first, end in _runs(known & inside):
+    for first, end in runs(known & inside):
         if end - first < rate_hz:
             continue
         run, cut = slice(first, end), slice(step // 2, None, step)
@@ -111,11 +112,6 @@ def knots(time_s: Floats) -> Floats:
 def shares(time_s: Floats, knots_s: Floats) -> Floats:
     """Return how much each knot counts at each time, (n, k), for straight lines between knots."""
     return np.stack([np.interp(time_s, knots_s, row) for row in np.eye(len(knots_s))], axis=-1)
-
-
-def _runs(kept: npt.NDArray[np.bool_]) -> list[tuple[int, int]]:
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], kept.astype(np.int8), [0]])))
-    return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
 
 
 def _moving(sensor: SensorMotion, run: slice, rate_hz: float) -> Floats:

@@ -4,7 +4,8 @@ from math import exp, radians, sin, sqrt
 
 import numpy as np
 
-from brachium_fusion.joint_matrices import Floats, orthonormal, skew, turn_by
+from brachium_body import rotation
+from brachium_fusion.joint_matrices import Floats, orthonormal, turn_by
 from brachium_fusion.joint_model import BLOCK, NODE_S, SPEED_SD, Interval, Joint, JointState, add
 
 GRAVITY = 9.80665
@@ -64,7 +65,7 @@ def advance(state: JointState, interval: Interval) -> Floats:
         interval.spread @ state.others[:, 3:9].reshape(2, 2, 3).swapaxes(1, 2), 2, axis=2
     )
     push = interval.push[:, :, None] - pushed
-    push = state.attitude @ (push - 0.5 * (skew(drift[:, :, 0]) @ interval.push[:, :, None]))
+    push = state.attitude @ (push - 0.5 * (rotation.cross_matrix(drift[:, :, 0]) @ interval.push[:, :, None]))
     spread = state.attitude @ interval.spread
     turned = turn_by(-drift[:, :, 0]) @ interval.turn
     state.attitude = orthonormal(state.attitude @ turned)
@@ -76,7 +77,7 @@ def advance(state: JointState, interval: Interval) -> Floats:
         state.still_s[0] + span if still_a else 0.0,
         state.still_s[1] + span if still_b else 0.0,
     )
-    lean = skew(push[:, :, 0])
+    lean = rotation.cross_matrix(push[:, :, 0])
     transition = _UNIT.copy()
     each = _of_both(transition)
     each[:, 0:3, 6:9] = each[:, 3:6, 9:12] = -spread
@@ -161,12 +162,12 @@ def _learn(noise: float, length: float) -> float:
 def _agree(told: _Told, state: JointState, gyr: Floats) -> None:
     """The joint centre is one, and rests over time."""
     rate = gyr - state.gyro_bias
-    turning = state.attitude @ skew(rate)
+    turning = state.attitude @ rotation.cross_matrix(rate)
     arm = (turning @ state.lever[:, :, None])[:, :, 0]
     per_sensor = np.zeros((2, 3, BLOCK))
-    per_sensor[:, :, 0:3] = -skew(arm)
+    per_sensor[:, :, 0:3] = -rotation.cross_matrix(arm)
     per_sensor[:, :, 3:6] = _UNITS
-    per_sensor[:, :, 6:9] = state.attitude @ skew(state.lever)
+    per_sensor[:, :, 6:9] = state.attitude @ rotation.cross_matrix(state.lever)
     per_sensor[:, :, 12:15] = turning
     centre = state.velocity + arm
     squared = float(np.einsum("si,si->s", rate, rate).max())
@@ -188,8 +189,8 @@ def _hold_axes(told: _Told, state: JointState, joint: Joint, gyr: Floats) -> Non
     variance = state.noise[1] * AXIS_SD**2 / looks
     if joint.axes == 2:
         row = told.part(1, sin(joint.carrying_rad) - float(a @ b), variance)
-        normal = skew(a) @ b
+        normal = rotation.cross_matrix(a) @ b
         row[0, 0, 0:3], row[0, 1, 0:3] = normal, -normal
     else:
         rows = told.part(3, b - a, variance)
-        rows[:, 0, 0:3], rows[:, 1, 0:3] = -skew(a), skew(b)
+        rows[:, 0, 0:3], rows[:, 1, 0:3] = -rotation.cross_matrix(a), rotation.cross_matrix(b)

@@ -11,8 +11,8 @@ from brachium_body import rotation
 from brachium_fusion import shoulder_increments as si
 from brachium_fusion.shoulder_arrow import Chain
 from brachium_fusion.shoulder_model import ArmModel, Bools, Floats, Sizes
-from brachium_fusion.shoulder_rest import runs
 from brachium_fusion.shoulder_tissue import UNKNOWNS, Tissue
+from brachium_fusion.still_stretches import runs
 
 SIZE = 12
 """Of a knot: displacement, velocity, turn of the upper arm's sensor, of the forearm's; all in the world."""

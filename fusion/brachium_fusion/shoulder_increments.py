@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from brachium_body import rotation
-from brachium_fusion.shoulder_model import GRAVITY, ArmModel, Floats, cross_matrix
+from brachium_fusion.shoulder_model import GRAVITY, ArmModel, Floats
 
 KNOT_S = 0.16
 """Distance of knots, about: movement of a shoulder has little above 3 Hz."""
@@ -114,7 +114,7 @@ def increments(
     whole, early, late = _weighted(turns.transpose(1, 0, 2, 3), every, period_s)
     velocity, by_turn = np.zeros((k, 6)), np.zeros((k, 6, 12))
     by_constant, turn_by_constant = np.zeros((k, 6, CONSTANTS)), np.zeros((k, 6, CONSTANTS))
-    weighed = -cross_matrix(np.stack([early[..., 0], late[..., 0]]))
+    weighed = -rotation.cross_matrix(np.stack([early[..., 0], late[..., 0]]))
     for i in range(2):
         row, first = slice(3 * i, 3 * i + 3), 12 * i
         velocity[:, row] = whole[:, i, :, 0]
@@ -155,12 +155,12 @@ def _levers(
     `world` (2, k + 1, 3, 3) and `rate` (2, k + 1, 3) are the sensors' at the knots."""
     levers = np.stack([model.lever_upper, model.elbow_from_shoulder, model.lever_forearm])
     levers = levers * _SIGN[:, None]
-    world, rate, arm = world[_SENSOR], rate[_SENSOR], cross_matrix(levers)[:, None]
+    world, rate, arm = world[_SENSOR], rate[_SENSOR], rotation.cross_matrix(levers)[:, None]
     across = world @ arm
     speed = -np.einsum("lkij,lkj->lki", across, rate)
-    turned = -cross_matrix(speed)
+    turned = -rotation.cross_matrix(speed)
     by_rate = np.diff(across * rate[:, :, None, :], axis=1)
-    turning = world @ cross_matrix(rate)
+    turning = world @ rotation.cross_matrix(rate)
     by_sitting = np.diff(turning @ arm, axis=1)
     by_lever = np.diff(turning * _SIGN[:, None, None, None], axis=1)
     gained, by_bias = np.diff(speed, axis=1), np.diff(across, axis=1)

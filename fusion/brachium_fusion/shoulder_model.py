@@ -170,15 +170,6 @@ def sizes(model: ArmModel) -> Sizes:
     return ON_SKIN if model.soft_tissue else ON_BONE
 
 
-def cross_matrix(v: Floats) -> Floats:
-    """Return [v]x (..., 3, 3) with [v]x w = v x w."""
-    m = np.zeros((*v.shape, 3))
-    m[..., 0, 1], m[..., 0, 2] = -v[..., 2], v[..., 1]
-    m[..., 1, 0], m[..., 1, 2] = v[..., 2], -v[..., 0]
-    m[..., 2, 0], m[..., 2, 1] = -v[..., 1], v[..., 0]
-    return m
-
-
 MOST_SCALE = 0.1
 CALIBRATED_SCALE = 0.01
 

@@ -12,7 +12,7 @@ import numpy as np
 from brachium_body import rotation
 from brachium_fusion.shoulder_equations import Ties
 from brachium_fusion.shoulder_model import Bools, Floats, Sizes
-from brachium_fusion.shoulder_rest import runs
+from brachium_fusion.still_stretches import runs
 
 SAME_RAD = 0.052
 """3 deg: as near must both sensors stand to how they stood."""

@@ -68,9 +68,3 @@ def _quiet(acceleration: Floats, fastest: Floats, width: int) -> Bools:
     quiet = (spread < SPREAD) & (maximum_filter1d(fastest, width, mode="nearest") < RATE)
     knots: Bools = np.concatenate([quiet[:1], quiet[1:] & quiet[:-1], quiet[-1:]])
     return knots
-
-
-def runs(flags: Bools) -> list[tuple[int, int]]:
-    """Return (first, end) of each run of True in flags (n,)."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(np.int8)))
-    return [(int(a), int(b)) for a, b in edges.reshape(-1, 2)]

@@ -2,10 +2,10 @@
 
 from math import cos, sin, sqrt
 
+from brachium_fusion.joint_matrices import Quaternion, product
 from brachium_fusion.shoulder_model import GRAVITY
 
 Vector = tuple[float, float, float]
-Quaternion = tuple[float, float, float, float]
 
 
 def turned(q: Quaternion, before: Vector, now: Vector, period_s: float) -> Quaternion:
@@ -19,18 +19,6 @@ def turned(q: Quaternion, before: Vector, now: Vector, period_s: float) -> Quate
     angle = sqrt(x * x + y * y + z * z)
     scale = sin(0.5 * angle) / angle if angle > 1e-9 else 0.5
     return unit(product(q, (cos(0.5 * angle), scale * x, scale * y, scale * z)))
-
-
-def product(p: Quaternion, q: Quaternion) -> Quaternion:
-    """Return the Hamilton product p q."""
-    pw, px, py, pz = p
-    qw, qx, qy, qz = q
-    return (
-        pw * qw - px * qx - py * qy - pz * qz,
-        pw * qx + px * qw + py * qz - pz * qy,
-        pw * qy - px * qz + py * qw + pz * qx,
-        pw * qz + px * qy - py * qx + pz * qw,
-    )
 
 
 def unit(q: Quaternion) -> Quaternion:

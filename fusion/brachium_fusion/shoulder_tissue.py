@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from brachium_body import rotation
-from brachium_fusion.shoulder_model import ArmModel, Floats, cross_matrix
+from brachium_fusion.shoulder_model import ArmModel, Floats
 
 UPPER_JOINTS = 4
 """Elbow flexion, then the upper arm's turn since the start about its three axes."""
@@ -48,8 +48,9 @@ class Tissue:
         sensor's."""
         k = len(rate)
         speed = np.gradient(self.upper, step_s, axis=0)
-        moved = cross_matrix(rate)[:, None] * self.upper[..., None, None] + speed[..., None, None] * np.eye(3)
-        elbow = world[:, None] @ moved @ cross_matrix(model.elbow_from_shoulder)
+        moved = rotation.cross_matrix(rate)[:, None] * self.upper[..., None, None]
+        moved = moved + speed[..., None, None] * np.eye(3)
+        elbow = world[:, None] @ moved @ rotation.cross_matrix(model.elbow_from_shoulder)
         result = np.zeros((k - 1, 3, UNKNOWNS))
         result[:, :, : 3 * UPPER_JOINTS] = np.diff(elbow, axis=0).transpose(0, 2, 1, 3).reshape(k - 1, 3, -1)
         return result

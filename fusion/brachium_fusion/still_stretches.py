@@ -21,13 +21,18 @@ def still_stretches(gyr: Floats, acc: Floats, rate_hz: float, shortest_s: float)
     if len(gyr) < width:
         return []
     quiet = (_spread(gyr, width) < GYRO_SPREAD) & (_spread(acc, width) < ACCEL_SPREAD)
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], quiet, [False]]).astype(np.int8)))
     found = []
-    for first, last in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
+    for first, last in runs(quiet):
         stretch = slice(first, last + width - 1)
         if stretch.stop - stretch.start >= shortest_s * rate_hz:
             found.append(stretch)
     return found
+
+
+def runs(flags: npt.NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """Return (first, end) of each run of True in flags (n,)."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(np.int8)))
+    return [(int(a), int(b)) for a, b in edges.reshape(-1, 2)]
 
 
 def _spread(values: Floats, width: int) -> Floats:

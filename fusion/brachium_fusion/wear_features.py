@@ -94,15 +94,8 @@ def _from_axis(
     acc - gravity = a x r + w x (w x r), the axis itself at rest."""
     gravity = rotation.rotate(rotation.inverse(start_from_sensor), force)
     angular = np.gradient(rate, 1.0 / rate_hz, axis=0)
-    skew = _skew(rate)
-    design = (_skew(angular) + skew @ skew).reshape(-1, 3)
+    skew = rotation.cross_matrix(rate)
+    design = (rotation.cross_matrix(angular) + skew @ skew).reshape(-1, 3)
     r, *_ = np.linalg.lstsq(design, (acc - gravity).reshape(-1), rcond=1e-3)
     axis = turn / np.linalg.norm(turn)
     return float(np.linalg.norm(r - axis * (r @ axis)))
-
-
-def _skew(v: Floats) -> Floats:
-    m = np.zeros((len(v), 3, 3))
-    m[:, 0, 1], m[:, 0, 2], m[:, 1, 2] = -v[:, 2], v[:, 1], -v[:, 0]
-    m[:, 1, 0], m[:, 2, 0], m[:, 2, 1] = v[:, 2], -v[:, 1], v[:, 0]
-    return m

@@ -53,7 +53,7 @@ def strapdown(start: Floats, gyr: Floats, rate_hz: float, *, orthonormal: bool) 
         return rotation.to_matrix(_chained(start, turn))
     result = np.empty((len(gyr), 3, 3))
     result[0] = rotation.to_matrix(start)
-    growth = np.eye(3) + _cross_matrix(steps)
+    growth = np.eye(3) + rotation.cross_matrix(steps)
     for i in range(len(steps)):
         result[i + 1] = result[i] @ growth[i]
     return result
@@ -104,12 +104,6 @@ def _integral(values: Floats, rate_hz: float) -> Floats:
     result = np.zeros_like(values)
     np.cumsum(0.5 * (values[1:] + values[:-1]) / rate_hz, axis=0, out=result[1:])
     return result
-
-
-def _cross_matrix(v: Floats) -> Floats:
-    x, y, z = v.T
-    zero = np.zeros_like(x)
-    return np.stack([zero, -z, y, z, zero, -x, -y, x, zero], axis=-1).reshape(-1, 3, 3)
 
 
 def _chained(start: Floats, turns: Floats) -> Floats:

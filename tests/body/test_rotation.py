@@ -44,6 +44,12 @@ def test_rotate_and_to_matrix_agree_with_scipy(q, v):
     assert np.allclose(rotation.to_matrix(q), judge(q).as_matrix(), atol=1e-13)
 
 
+@given(vectors, vectors)
+def test_a_cross_matrix_times_a_vector_is_their_cross_product(v, x):
+    assert np.array_equal(rotation.cross_matrix(v) + rotation.cross_matrix(v).T, np.zeros((3, 3)))
+    assert np.allclose(rotation.cross_matrix([v, x]) @ x, np.cross([v, x], x), atol=1e-12)
+
+
 @given(quaternions())
 def test_from_matrix_is_the_inverse_of_to_matrix(q):
     back = rotation.from_matrix(judge(q).as_matrix())
