@@ -258,6 +258,7 @@ def test_a_dock_that_speaks_before_an_answer_is_skipped():
     [
         ({"x2E": b"\xff\x2f\x03\x00\x00\x00\x05\x00"}, "0.5.0: a Shimmer3 .* 0.6 or newer"),
         ({"x3F": b"\xff\x25\x0a"}, "hardware 10"),
+        ({"x2E": b""}, "no answer to firmware version"),
         ({"x2C": b"\x00"}, "no answer to calibration"),
         ({"x40": b"\xfe"}, "refuses accelerometer rate"),
         ({"x01": b"\xff\x02\x80\x02\x08\x9b\x03\x00\x03\x01\x0a\x0b\x0c"}, "wide-range was asked for"),

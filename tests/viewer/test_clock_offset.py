@@ -36,18 +36,21 @@ def test_a_shift_is_found_whatever_way_the_sensors_are_turned(offset_s, seed):
 
 
 def test_its_interval_holds_the_shift_as_often_as_it_says():
-    inside = 0
+    inside = straight = 0
     for seed in range(40):
         a, b, _ = pair(0.04, seed)
         found = clock_offset(a, b)
         assert 0.0 < found.margin_s < 5e-3
         inside += abs(found.offset_s - 0.04) <= found.margin_s
-    assert inside >= 34  # 38 of 40 are expected
+        straight += abs(found.drift_ppm) <= found.drift_margin_ppm
+    assert min(inside, straight) >= 34  # 38 of 40 are expected
 
 
 def test_a_clock_that_runs_away_is_told():
     a, b, _ = pair(0.0, 3, seconds=120.0, noise=0.002, skew=60e-6)
-    assert clock_offset(a, b).drift_ppm == pytest.approx(60.0, abs=10.0)
+    found = clock_offset(a, b)
+    assert found.drift_ppm == pytest.approx(60.0, abs=10.0)
+    assert 0.0 < found.drift_margin_ppm < 20.0
 
 
 def test_samples_that_are_missing_are_not_made_up():
@@ -58,6 +61,11 @@ def test_samples_that_are_missing_are_not_made_up():
     assert found.seconds < 22.5
 
 
+def once(rates):
+    """Return the same with one movement in the middle."""
+    return Rates(rates.time_s, 20.0 * rates.gyr * np.exp(-(((rates.time_s - 15.0) / 0.4) ** 2))[:, None])
+
+
 @pytest.mark.parametrize(
     ("change", "said"),
     [
@@ -65,6 +73,7 @@ def test_samples_that_are_missing_are_not_made_up():
         (lambda a, b: (Rates(a.time_s[:1], a.gyr[:1]), b), "not measured anything yet"),
         (lambda a, b: (Rates(a.time_s, 0.01 * a.gyr), b), "hardly moves"),
         (lambda a, b: (a, Rates(b.time_s, turning(b.time_s, 99))), "fixed to the same segment"),
+        (lambda a, b: (once(a), once(b)), "for a moment only"),
     ],
 )
 def test_what_cannot_be_compared_is_refused_with_what_to_do(change, said):

@@ -27,6 +27,7 @@ ALIKE = 0.8
 """Correlation of the angular speeds below which the two are not on one segment."""
 BLOCKS = 12
 """Parts of the time that each tell the offset; their spread says how sure it is."""
+FEWEST_BLOCKS = 4
 _STEP_S = 0.01
 
 
@@ -43,6 +44,8 @@ class ClockOffset:
     """Half its 95 % confidence interval."""
     drift_ppm: float
     """By how much the offset grows."""
+    drift_margin_ppm: float
+    """Half its 95 % confidence interval."""
     correlation: float
     """Of the angular speeds, with the offset taken out."""
     seconds: float
@@ -78,11 +81,12 @@ def clock_offset(a: Rates, b: Rates) -> ClockOffset:
     for _ in range(6):
         offset_s += float(np.clip(_step(*_slopes(time, first, b, offset_s)[:2]), -_STEP_S, _STEP_S))
     along, weight, known = _slopes(time, first, b, offset_s)
-    margin_s, drift = _spread(time[known], along, weight)
+    margin_s, drift, drift_margin = _spread(time[known], along, weight)
     return ClockOffset(
         offset_s=offset_s,
         margin_s=margin_s,
         drift_ppm=1e6 * drift,
+        drift_margin_ppm=1e6 * drift_margin,
         correlation=_alike(_speeds(first), _speeds(interpolate(time + offset_s, b.time_s, b.gyr, MAX_GAP_S))),
         seconds=float(known.sum() / RATE_HZ),
     )
@@ -139,8 +143,10 @@ def _step(along: Floats, weight: Floats) -> float:
     return float(along.sum() / weight.sum())
 
 
-def _spread(time: Floats, along: Floats, weight: Floats) -> tuple[float, float]:
-    """Return half the 95 % interval of the mean of the blocks' steps, s, and how they grow, s/s."""
+def _spread(time: Floats, along: Floats, weight: Floats) -> tuple[float, float, float]:
+    """Return half the 95 % interval of the mean of the blocks' steps, s; how they grow, s/s, and half its
+    interval.
+    """
     parts = [p for p in np.array_split(np.arange(len(time)), BLOCKS) if weight[p].sum() > 0.0]
     w = np.array([weight[p].sum() for p in parts])
     steps = np.array([along[p].sum() for p in parts]) / w
@@ -149,8 +155,14 @@ def _spread(time: Floats, along: Floats, weight: Floats) -> tuple[float, float]:
     told = w > 0.05 * w.mean()
     w, steps, middle = w[told] / w[told].sum(), steps[told], middle[told]
     n = len(w)
-    off = steps - (w * steps).sum()
-    variance = (w**2 * off**2).sum() * n / (n - 1)
-    at = middle - (w * middle).sum()
-    drift = float((w * at * off).sum() / (w * at**2).sum())
-    return float(stats.t.ppf(0.975, n - 1) * np.sqrt(variance)), drift
+    if n < FEWEST_BLOCKS:
+        raise Unrelated("the segment moved for a moment only: exercise for longer")
+    off, at = steps - (w * steps).sum(), middle - (w * middle).sum()
+    squares = (w * at**2).sum()
+    drift = float((w * at * off).sum() / squares)
+    left = off - drift * at
+    return (
+        float(stats.t.ppf(0.975, n - 1) * np.sqrt((w**2 * off**2).sum() * n / (n - 1))),
+        drift,
+        float(stats.t.ppf(0.975, n - 2) * np.sqrt((w**2 * at**2 * left**2).sum() * n / (n - 2)) / squares),
+    )

@@ -43,7 +43,8 @@ def _clock(c: LiveComparison) -> list[str]:
         f"clock: the times of {c.b} are {1e3 * clock.offset_s:+.1f} ms +- {1e3 * clock.margin_s:.1f} ms "
         f"(95 %) against those of {c.a},",
         f"  by {clock.seconds:.0f} s of the turning of {c.found.segment} "
-        f"(correlation {clock.correlation:.4f}, drift {clock.drift_ppm:+.0f} ppm); taken out",
+        f"(correlation {clock.correlation:.4f}, drift {clock.drift_ppm:+.0f} +- "
+        f"{clock.drift_margin_ppm:.0f} ppm); taken out",
     ]
     stated = ", ".join(f"{name} +- {1e3 * s:.1f} ms" for name, s in c.hosts.stated_s.items())
     if hosts.apart_s is not None and hosts.margin_s is not None:

@@ -11,6 +11,8 @@ QUIET_NS = 300_000_000
 PATIENCE_NS = 1_500_000_000
 """For one answer; Bluetooth sends lost frames again for about a second."""
 TRIES = 3
+FIRST_TRIES = 8
+"""Of the first request: opening a Bluetooth port only begins to look for the device, for some seconds."""
 LONGEST_QUIETING_NS = 5_000_000_000
 
 
@@ -163,7 +165,7 @@ class Dialogue:
             return b""
         if now_ns - self._asked_ns < PATIENCE_NS:
             return b""
-        if self._tries >= TRIES:
+        if self._tries >= (FIRST_TRIES if self._request is p.FIRMWARE else TRIES):
             raise p.ShimmerError(
                 f"no answer to {self._request.name}: is it a Shimmer3, switched on and near by?"
             )

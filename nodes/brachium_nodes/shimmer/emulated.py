@@ -89,7 +89,12 @@ class EmulatedShimmer:
         self._pending += data
         out = b""
         while self._pending:
-            extra = {0x05: 2, 0x08: 3, 0x66: 2, **dict.fromkeys((0x09, 0x40, 0x49, 0x4C, 0x37, 0x3A), 1)}
+            extra = {
+                0x05: 2,
+                0x08: 3,
+                0x66: 2,
+                **dict.fromkeys((0x09, 0x40, 0x49, 0x4C, 0x37, 0x3A, 0xA3), 1),
+            }
             length = 1 + extra.get(self._pending[0], 0)
             if len(self._pending) < length:
                 break
@@ -106,6 +111,8 @@ class EmulatedShimmer:
             answer = b"\x25\x03"
         elif command == 0x66:  # board SR31, revision 6
             answer = b"\x65" + words[:1] + bytes([31, 6, 0])
+        elif command == 0x03:
+            answer = b"\x04" + bytes([self.period & 255, self.period >> 8])
         elif command == 0x05:
             self.period = words[0] + 256 * words[1]
         elif command == 0x08:

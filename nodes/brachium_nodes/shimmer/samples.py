@@ -19,7 +19,7 @@ class Stream:
 
     def __init__(self, device: Device, clock: TickCounter | None = None) -> None:
         self.device = device
-        self.reader = PacketReader(channel_bytes=2 * len(device.formats) // 2, period=device.ticks)
+        self.reader = PacketReader(channel_bytes=len(device.formats), period=device.ticks)
         self.clock = clock or TickCounter(device.ticks)
         self._resumed = clock is not None
         self.restarted = clock is None

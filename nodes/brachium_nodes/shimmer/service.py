@@ -3,6 +3,7 @@
 import logging
 import secrets
 import threading
+from collections import Counter
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -81,6 +82,7 @@ class ShimmerService:
         self._stream: Stream | None = None
         self._battery_v: float | None = None
         self._counted, self._counted_ns = 0, 0
+        self._drops: Counter[str] = Counter()
         tell_host_time(bus, settings.room, settings.name, self._clock.now_ns)
 
     def serve(self, stop: threading.Event) -> None:
@@ -138,6 +140,10 @@ class ShimmerService:
 
     def _begin(self, device: Device) -> None:
         settings, before = self._settings, self._stream
+        if before is not None:  # what was dropped stays counted over connections
+            self._drops["skipped_bytes"] += before.reader.skipped
+            self._drops["resynchronised"] += before.reader.resynchronised
+            self._drops["repeated_stamp"] += before.repeated
         self._stream = Stream(
             device, before.clock if before and before.device.ticks == device.ticks else None
         )
@@ -220,8 +226,8 @@ class ShimmerService:
             self._battery_v = reader.battery_v
         span_ns, gained = now_ns - self._counted_ns, counter.received - self._counted
         self._counted, self._counted_ns = counter.received, now_ns
-        drops = {"skipped_bytes": reader.skipped, "resynchronised": reader.resynchronised}
-        drops |= {"repeated_stamp": self._stream.repeated, **memory.drops}
+        drops = Counter(skipped_bytes=reader.skipped, resynchronised=reader.resynchronised)
+        drops.update(self._drops, repeated_stamp=self._stream.repeated, **memory.drops)
         status = Status(
             node=settings.name,
             time_ns=now_ns,
