@@ -18,6 +18,7 @@ COMMANDS: dict[str, str] = {
     "wear-check": "which sensor sits where, and whether it is turned: it says what to change",
     "view": "the live view",
     "record": "the recorder",
+    "lsl": "the room as Lab Streaming Layer streams, markers back as events; taps that a camera sees",
     "monitor": "the network in the terminal: nodes, rates, loss, latency",
     "sensor": "fit a sensor's own calibration from a recording, and keep it for the gateway",
     "conformance": "try any node from outside against the rules of the node protocol",

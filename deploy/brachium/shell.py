@@ -19,6 +19,7 @@ EXTRAS = {
     "jinja2": "report",
     "matplotlib": "report",
     "can": "can",
+    "pylsl": "lsl",
     "cantools": "can",
     "segno": "site",
 }
@@ -153,7 +154,7 @@ class _Help(argparse.RawDescriptionHelpFormatter):
     """Shows each option's default, where there is one."""
 
     def _get_help_string(self, action: argparse.Action) -> str | None:
-        shown = action.help and action.default not in (None, False, argparse.SUPPRESS)
+        shown = action.help and action.default not in (None, False, [], argparse.SUPPRESS)
         return f"{action.help} (default: %(default)s)" if shown else action.help
 
 
