@@ -60,6 +60,7 @@ def test_each_command_explains_itself_with_an_example(name: str, capsys: pytest.
     assert ended.value.code == 0
     said = capsys.readouterr().out
     assert f"usage: brachium {name}" in said
+    assert "default: []" not in said
     example = said.split("example:\n")[1]
     assert f"brachium {name} " in example or f"brachium {name}\n" in example
 
