@@ -8,7 +8,7 @@ _LONGEST = 3000  # bytes of a request: what browsers send is a third of it
 _WITHIN_S = 5
 _CROWD = 3
 
-_PAGE = b"""<!doctype html><meta charset=utf-8><meta name=viewport content="width=device-width">
+_PAGE = b"""<!doctype html><html lang=en><meta charset=utf-8><meta name=viewport content="width=device-width">
 <title>Brachium node</title><style>body{font:18px sans-serif;max-width:26em;margin:1em auto;padding:0 1em}
 input,select,button{font:inherit;width:100%;box-sizing:border-box;margin:.2em 0 1em;padding:.4em}</style>
 <h1>Brachium node</h1><form method=post action=/save>
