@@ -1,6 +1,7 @@
 """A node's side of the WebSocket: hello, answers to clock questions, frames, and a bye with its count."""
 
 import asyncio
+import logging
 from collections.abc import Callable
 
 import msgspec
@@ -25,6 +26,8 @@ from brachium_nodes.node_frames import (
 )
 from brachium_wire.codec import WireError, encode
 from brachium_wire.messages import SensorCalibration
+
+log = logging.getLogger(__name__)
 
 LEAVE_WITHIN_S = 2.0
 
@@ -164,8 +167,9 @@ class NodeClient:
     async def _keep(self, socket: ClientConnection, frame: Keep) -> None:
         try:
             calibration = calibration_of(frame.calibration)
-        except WireError:
+            self._store(calibration)
+        except (WireError, OSError) as error:
+            log.warning("node %s does not keep its calibration: %s", self._hello.node, error)
             return
-        self._store(calibration)
         self._hello = msgspec.structs.replace(self._hello, calibration=calibration)
         await socket.send(encode(Kept()))

@@ -1,8 +1,8 @@
 """A calibration that fusion found reaches its node, is stored there, and is brought by it from then on."""
 
 import asyncio
-import contextlib
 import json
+import subprocess
 import threading
 import time
 from pathlib import Path
@@ -14,6 +14,7 @@ from brachium_nodes.bench_hands import MISTAKES
 from brachium_nodes.emulate import EmulateSettings, node_entries
 from brachium_nodes.emulated_board.settings import BoardSettings
 from brachium_nodes.emulated_flash import with_flash
+from brachium_nodes.firmware_build import micropython
 from brachium_nodes.firmware_host import FirmwareNode, prepare
 from brachium_nodes.gateway import token_sha256
 from brachium_nodes.kept_calibration import LONGEST_TEXT, Keeping, alike, calibration_of, text_of
@@ -117,9 +118,7 @@ class Joined:
         raise OSError("the flash is full")
 
     def leave(self) -> None:
-        done = asyncio.run_coroutine_threadsafe(self._client.leave(0), self._loop)
-        with contextlib.suppress(OSError):
-            done.result(10)
+        asyncio.run_coroutine_threadsafe(self._client.leave(0), self._loop).result(10)
         self._loop.call_soon_threadsafe(self._loop.stop)
         self._thread.join(10)
         self._loop.close()
@@ -146,14 +145,15 @@ def test_a_node_that_is_there_or_comes_back_is_told_once(gateway, listener, bus)
 
 @pytest.mark.network
 def test_a_gateway_that_starts_later_brings_it_and_keeps_it_for_a_node_that_cannot(
-    gateway, listener, bus
+    gateway, listener, bus, caplog
 ) -> None:
     tell(bus, "n1")
     node = Joined(gateway(entry()).url, stores=False)
     listener.until(lambda: listener.of("info"), "the node's info")
     assert (listener.of("info")[0].calibration, listener.of("info")[0].kept) == (FOUND, "gateway")
-    node.leave()
+    node.leave()  # it said nothing, and went on
     assert {i.kept for i in listener.of("info")} == {"gateway"}
+    assert "the flash is full" in caplog.text
 
 
 @pytest.mark.network
@@ -185,6 +185,23 @@ def test_the_firmware_stores_it_and_brings_it_when_it_is_switched_on_again(
     node.stop()
     last = listener.of("info")[-1]
     assert (last.kept, alike(last.calibration, FOUND)) == ("node", True)
+
+
+def test_a_flash_with_anything_in_it_is_no_crash(firmware, tmp_path: Path) -> None:
+    program = tmp_path / "program.py"
+    program.write_text(
+        "import sys, json; sys.path.insert(0, sys.argv[1]); import keeping as k\n"
+        "said = [k.calibration()]\n"
+        "for text in ('[1]', '{', '{\"x\": 1, \"gyro_bias\": [1, 2, 3]}', None, 7):\n"
+        "    said.append([k.keep(text), k.calibration()])\n"
+        "print(json.dumps(said))"
+    )
+    words = [*micropython(), str(program), str(firmware.firmware)]
+    done = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, timeout=60, check=True)
+    known = {"gyro_bias": [1, 2, 3]}
+    assert json.loads(done.stdout.splitlines()[-1]) == [
+        {}, [True, {}], [True, {}], [True, known], [False, known], [False, known],
+    ]  # fmt: skip
 
 
 def test_an_emulated_nodes_flash_outlives_it(tmp_path: Path) -> None:

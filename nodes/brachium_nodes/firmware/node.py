@@ -167,10 +167,11 @@ class Node:
             elif kind == "keep/1":
                 import keeping
 
-                keeping.keep(said.get("cal", "{}"))
+                stored = keeping.keep(said.get("cal"))
                 keeping = None
                 sys.modules.pop("keeping", None)
-                await link.send(_kept)
+                if stored:
+                    await link.send(_kept)
             elif kind == "refused/1":
                 raise Refused(said)
 
