@@ -83,6 +83,7 @@ def test_what_a_gateway_says_is_read_and_what_is_broken_is_nothing(on_chip):
         "no": None,
         "is": True,
         "low": -7,
+        "later": {"with": [1, {"more": [True, "x"]}]},
     }
     whole = msgpack.packb(said)
     broken = [
@@ -91,7 +92,8 @@ def test_what_a_gateway_says_is_read_and_what_is_broken_is_nothing(on_chip):
         b"",
         b"\xc1",
         b"\x93\1\2\3",
-        b"\x81\xa1m\x90",
+        b"\x81\xa1m\x91",
+        b"\x91" * 9,
         b"\xdf" * 9,
         b"\x81\xd9\xff",
     ]

@@ -84,6 +84,9 @@ class Writer:
                 self._pack(">Bf", 0xCA, value)
 
 
+_DEEPEST = 4  # maps and lists within one another
+
+
 def read_map(message):
     """Return a message's map, or {} for what is none."""
     try:
@@ -100,11 +103,17 @@ def _read(data, at, depth):
         return kind, at
     if kind >= 0xE0:
         return kind - 256, at
-    if kind < 0x90 and not depth:
+    if kind < 0x90 and depth < _DEEPEST:
         values = {}
         for _ in range(kind & 15):
-            key, at = _read(data, at, 1)
-            values[key], at = _read(data, at, 1)
+            key, at = _read(data, at, _DEEPEST)
+            values[key], at = _read(data, at, depth + 1)
+        return values, at
+    if kind < 0xA0 and depth < _DEEPEST:  # in a field that is not known here
+        values = []
+        for _ in range(kind & 15):
+            value, at = _read(data, at, depth + 1)
+            values.append(value)
         return values, at
     if 0xA0 <= kind < 0xC0 or kind in (0xD9, 0xDA):
         size = kind & 31

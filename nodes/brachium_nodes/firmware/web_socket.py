@@ -67,6 +67,7 @@ class WebSocket:
             if kind == 9:
                 await self.send(_copy, data, kind=10)
             elif kind == 8:
+                await self.send(_copy, data[:2], kind=8)
                 code = struct.unpack_from(">H", data)[0] if size >= 2 else 1005
                 raise EOFError("closed with %d" % code)
             elif kind < 3:
