@@ -137,7 +137,10 @@ class SocketSink:
         """The clock that gives host time, once joined."""
 
     async def join(self) -> None:
-        """Be let in."""
+        """Be let in; not before the time that the gateway named when it ended the last connection."""
+        refused, self._client.refused = self._client.refused, None
+        if refused is not None and refused.retry_s is not None:
+            await asyncio.sleep(refused.retry_s)
         self.host = (await self._client.join()).host
 
     async def send(self, packet: Outgoing) -> None:
