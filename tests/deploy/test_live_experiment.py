@@ -11,7 +11,7 @@ DELAY_S = 0.06
 
 @pytest.fixture(scope="module")
 def experiment(brachium):
-    words = ["compare", "--live", "p01", "p01.ref", "--emulate", "--seconds", "12"]
+    words = ["compare", "--live", "p01", "p01.ref", "--emulate", "--seconds", "9"]
     done = brachium(*words, "--shimmer-delay", str(DELAY_S), "--json", timeout_s=120.0)
     assert done.returncode == 0, done.stderr
     return json.loads(done.stdout)

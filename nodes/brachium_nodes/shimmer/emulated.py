@@ -15,8 +15,6 @@ from brachium_nodes.sensors import generator
 
 Floats = npt.NDArray[np.float64]
 
-G = 9.81
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Factory:
