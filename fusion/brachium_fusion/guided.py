@@ -176,8 +176,8 @@ class Guided:
         self, now: int, live: Mapping[str, Reading], tracks: Mapping[str, SegmentTrack], since_s: float
     ) -> Told | FitRequest | str | None:
         step, motion = self._step, self.wish.motions[self._step.index]
-        rates = [m.gyr for s in live if s.startswith("forearm") and (m := tracks[s].timeline.motion_at(now))]
-        step.turned += since_s * max((float(np.linalg.norm(rate)) for rate in rates), default=0.0)
+        forearms = [s for s in live if s.startswith("forearm")]
+        step.turned += max((self._turned(s, now, tracks[s], since_s) for s in forearms), default=0.0)
         seen = min(1.0, step.turned / ENOUGH_RAD[motion])
         if motion == "free":
             wanted_s = ONLY_FREE_S if len(self.wish.motions) == 1 else FREE_S
@@ -194,6 +194,13 @@ class Guided:
         if seen >= step.told + 0.1:
             return self._told(seen)
         return None
+
+    def _turned(self, segment: str, now: int, track: SegmentTrack, since_s: float) -> float:
+        """Return by how much a sensor turned since the last instant, rad."""
+        motion = track.timeline.motion_at(now)
+        if motion is not None:
+            return since_s * float(np.linalg.norm(motion.gyr))
+        return self._record.turned(segment) if track.info.orientation_only else 0.0
 
     def _told(self, seen: float) -> Told:
         step = self._step

@@ -40,6 +40,14 @@ class MotionRecord:
             self._rows.setdefault(segment, []).append((len(self.times_ns), row))
         self.times_ns.append(now)
 
+    def turned(self, segment: str) -> float:
+        """Return by how much a sensor turned between the last two instants, rad; 0 unless both have it."""
+        rows = self._rows.get(segment, [])[-2:]
+        if [index for index, _ in rows] != [len(self.times_ns) - 2, len(self.times_ns) - 1]:
+            return 0.0
+        before, after = (row[:4].astype(np.float64) for _, row in rows)
+        return float(rotation.angle_between(rotation.normalize(before), rotation.normalize(after)))
+
     def records(self, tracks: Mapping[str, SegmentTrack]) -> dict[str, SensorRecord]:
         """Return all sensors' records, of equal length; NaN where one was not there.
 

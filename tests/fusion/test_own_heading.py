@@ -10,9 +10,12 @@ from brachium_body.kinematics import SegmentOrientations, between
 from brachium_body.segments import arm_segments
 from brachium_fusion import best
 from brachium_fusion.best_material import Material, TimedSpan
+from brachium_fusion.calibration_wish import checked_wish
 from brachium_fusion.pipeline import Pipeline
-from brachium_fusion.settings import Settings
+from brachium_fusion.settings import Change, Settings
 from brachium_fusion.uniform import Series
+from brachium_nodes.session import session_arrays
+from brachium_nodes.wearer import WearerSettings
 from brachium_wire.codec import decode_topic
 from brachium_wire.messages import SampleBatch, Session, Skeleton
 
@@ -110,3 +113,42 @@ def test_offline_too_each_gets_its_heading(made) -> None:
     )
     found = best.solve(material, Settings(), times[::2])
     assert worst_deg(made, found.skeletons, poses) < 1.0
+
+
+def test_a_person_is_led_through_movements_that_only_orientations_show(made) -> None:
+    """Bending the elbow tells the headings though nothing is known of how the sensors are put on."""
+    chosen = WearerSettings(
+        routine="calibration",
+        exercise="reaching",
+        level="ideal",
+        seed=4,
+        rate_hz=50.0,
+        segments=("upper_arm_r", "forearm_r"),
+    )
+    session = session_arrays(chosen, 60.0)
+    pipeline = Pipeline(Settings(auto_pose=False))
+    for segment in session.sensors:
+        said = made.info(node=f"n-{segment}", rate_hz=50.0, heading_free=True, origin="worn")
+        pipeline.subject("p01").inform(segment, said)
+    pipeline.apply("p01", Change(made.START, "calibrate", checked_wish({"routine": "guided"})))
+    skeletons: list[Skeleton] = []
+    for first in range(0, len(session.time_s) - 5, 5):
+        for segment, sensor in session.sensors.items():
+            turned = rotation.multiply(rotation.about(2, HEADINGS[segment]), sensor.world_from_sensor)
+            pipeline.samples("p01", segment, made.samples(first, rate=50.0, quat=turned[first : first + 5]))
+        skeletons += [one.skeleton for one in pipeline.skeletons()]
+        for subject, request in pipeline.fits():
+            now = pipeline.subject(subject).next_tick_ns()
+            pipeline.apply(subject, Change(now, "align", request.fit()))
+    told = [news for _, news in pipeline.calibrations]
+    assert {"elbow-flexion", "pronation", "free"} <= {news.motion for news in told}
+    assert told[-1].state == "done"
+    rows = [round((s.time_ns - made.START) * 50e-9) for s in skeletons]
+    true = session.arms["right"].angles["elbow_flexion"]
+    off = [
+        np.degrees(s.angles["elbow_flexion"] - true[row])
+        for s, row in zip(skeletons, rows, strict=True)
+        if s.time_ns > told[-1].time_ns and row < len(true)
+    ]
+    assert len(off) > 200
+    assert np.sqrt(np.mean(np.square(off))) < 4.0
