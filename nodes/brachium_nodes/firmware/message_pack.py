@@ -84,7 +84,7 @@ class Writer:
                 self._pack(">Bf", 0xCA, value)
 
 
-_DEEPEST = 4  # maps and lists within one another
+_DEEPEST = 6  # maps and lists within one another
 
 
 def read_map(message):
