@@ -5,6 +5,8 @@ import threading
 import time
 from typing import Any
 
+import msgspec
+
 from brachium import sensor_picture
 from brachium.shell import Failed, print_json
 from brachium_fusion import sensor_guide
@@ -92,13 +94,18 @@ class _Screen:
     def __init__(self, *, quiet: bool) -> None:
         self._quiet, self._terminal = quiet, sys.stdout.isatty()
         self._drawn, self._said = 0, ""
+        self._at, self._covered = ("", 0), 0.0
 
     def show(self, progress: SensorProgress) -> None:
         """Show how far it is."""
         if self._quiet or progress.state != "running":
             return
         if not self._terminal:
-            words = sensor_picture.line(progress)
+            if (progress.step, progress.attempt) != self._at:
+                self._at, self._covered = (progress.step, progress.attempt), 0.0
+            # What is covered is guessed anew with every reading, and falls at times: no news for a line.
+            self._covered = max(self._covered, progress.coverage)
+            words = sensor_picture.line(msgspec.structs.replace(progress, coverage=self._covered))
             if words != self._said:
                 print(words, flush=True)
             self._said = words

@@ -1,6 +1,7 @@
 """`brachium calibrate --sensor`: over a whole network, what it shows, what it refuses to begin."""
 
 import json
+import re
 import signal
 import threading
 from collections.abc import Iterator
@@ -84,6 +85,9 @@ def test_all_steps_are_led_in_plain_lines(network: str, capsys: pytest.CaptureFi
         said.index("rest: put the sensor") < said.index("faces: lay it on") < said.index("turn: pick it up")
     )
     assert "still to point upwards: -x, +y, -y, +z, -z" in said
+    covered = [int(share) for share in re.findall(r"\(([0-9]+) % of all directions\)", said)]
+    assert covered == sorted(covered)
+    assert covered[-1] >= 70
     assert f"{SEGMENT} (emu-p01-forearm_r):\n" in said
     assert "gyro bias, deg/s: " in said
     assert "no gateway has taken it yet" in said  # these hands' node has none
