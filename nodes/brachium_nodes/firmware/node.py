@@ -14,7 +14,7 @@ from web_socket import ROOM
 _STALLED_MS = 5000  # a message that does not go out, or a gateway that does not ask for the clock
 _LOOK_MS = 250
 _FIRST_PAUSE_MS = 500
-_STEADY_MS = 10000
+_STEADY_MS = 3000  # who was welcome for so long is soon back, once cut off
 
 
 class Refused(OSError):
@@ -36,7 +36,7 @@ class Node:
         self._writer = Writer(max(18 * configuration["batch"] + 128, 512), ROOM)
         self._waiting = asyncio.Event()
         batches.wake = self._waiting.set
-        self._link = self._failure = None
+        self._link = self._failure = self._joined = None
         self._heard = 0
         self._is_asked, self.asked = asked, False
         self._ends = False
@@ -66,7 +66,7 @@ class Node:
         pause = _FIRST_PAUSE_MS
         longest = self._about["longest_pause_s"] * 1000
         while not self._ends:
-            began, wait = time.ticks_ms(), 0
+            self._joined, wait = None, 0
             try:
                 await self._converse()
             except Refused as refused:
@@ -77,7 +77,7 @@ class Node:
             gc.collect()
             if self._ends:
                 return
-            if time.ticks_diff(time.ticks_ms(), began) > _STEADY_MS:
+            if self._joined is not None and time.ticks_diff(time.ticks_ms(), self._joined) > _STEADY_MS:
                 pause = _FIRST_PAUSE_MS
             rest = max(min(wait, longest), pause // 2 + random.randrange(pause))
             while rest > 0 and not self._ends:
@@ -97,7 +97,8 @@ class Node:
         tasks = ()
         try:
             said = self._welcomed(read_map(said))
-            self._link, self._heard = link, time.ticks_ms()
+            self._link = link
+            self._heard = self._joined = time.ticks_ms()
             self._batches.keeping = self._batches.connected = True
             self._failure = None
             tasks = [
