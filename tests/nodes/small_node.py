@@ -61,8 +61,7 @@ class Taking:
             begun = int(5e6 + 1e6 * self.next / rate)
             self.waiting.append([self.next, begun, int(1e6 / rate), not connected])
             self.next += N
-            if wrong == "sequence" and self.next % 100 == 0:
-                self.next += 1
+            self.next += wrong == "sequence" and self.next // N % 50 == 0
             if len(self.waiting) > 2 * RATE / N:
                 self.waiting.pop(0)
                 self.dropped += N
@@ -98,7 +97,6 @@ class Link:
         self.rest, self.sent, self.heard, self.silent = b"", 0, time.monotonic(), time.monotonic()
         path = "/" if wrong == "request" else "/node"
         bearer = "" if wrong == "token" else f"Authorization: Bearer {token}\r\n"
-        path += f"?token={token}" if wrong == "token" else ""
         key = base64.b64encode(os.urandom(16)).decode()
         self.way.sendall(
             f"GET {path} HTTP/1.1\r\nHost: {host}\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
@@ -130,7 +128,7 @@ class Link:
         self.sent += 1
 
     def say(self, message):
-        self.frame(1 if wrong == "messages" and message["m"] == "status/1" else 2, msgpack.packb(message))
+        self.frame(2, msgpack.packb(message))
 
     def read(self, seconds):
         """Return what came: (kind, payload), at most one."""
@@ -212,6 +210,8 @@ def converse(link):
         if time.monotonic() - told > (2.8 if wrong == "status" else 1.0):
             told = time.monotonic()
             link.say(status())
+            if wrong == "messages":
+                link.frame(1, b'{"m": "status/1"}')
     link.say({"m": "bye/1", "next": taking.next - 50 if wrong == "bye" else taking.next})
     link.way.settimeout(2)
     link.read(2)
@@ -259,7 +259,9 @@ while not stopped:
         pause = 0.4
     if wrong == "return after close" and calibration and not told:
         time.sleep(60)
-    end = time.monotonic() + (0.05 if wrong == "back-off" else max(told, pause * random.uniform(0.8, 1.2)))
+    end = time.monotonic() + (
+        0.05 if wrong == "back-off" and not told else max(told, pause * random.uniform(0.8, 1.2))
+    )
     while time.monotonic() < end and not stopped:
         taking.measure(connected=False)
         time.sleep(0.01)

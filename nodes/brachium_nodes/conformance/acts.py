@@ -21,7 +21,7 @@ from brachium_wire.codec import encode
 
 REFUSALS = 3
 SHORTEST_S, LONGEST_S = 0.2, 45.0
-PAIRS, SPREAD_S, NAGLED_S = 20, 0.001, 0.025
+PAIRS, NAGLED_S = 20, 0.025
 """A small message that waits for an acknowledgement waits 40 ms on Linux, longer elsewhere."""
 RETRY_S = 2.0
 CALIBRATION = '{"gyro_bias": [0.0125, -0.0175, 0.0025]}'
@@ -43,10 +43,15 @@ class Play:
         caller = self.stage.accept(within_s)
         if caller is None:
             return None
+        self.let_in(caller)
+        return caller
+
+    def let_in(self, caller: Caller) -> None:
+        """Upgrade and welcome it."""
         caller.upgrade()
+        caller.heard.life = self.trial.starts
         self.heard.append(caller.heard)
         greet(caller)
-        return caller
 
     def back(self, rule: str) -> Caller | None:
         """Return the node's call after it was cut off, and judge that it came; else start it anew."""
@@ -132,9 +137,7 @@ def _no_delay(caller: Caller) -> Verdict:
     for _ in range(PAIRS):
         caller.acknowledge_late()
         due = len(caller.heard.exchanges) + 2
-        caller.ask()
-        time.sleep(SPREAD_S)
-        caller.ask()
+        caller.ask(2)
         caller.attend(1.0, ask=False, until=partial(_has, due))
         last = caller.heard.exchanges[due - 2 :]
         if len(last) == 2:
@@ -197,9 +200,7 @@ def silence(play: Play, caller: Caller) -> Caller | None:
         play.verdicts.append(failed("return after silence", f"still there after {waited:.0f} s"))
         return play.anew()
     play.verdicts.append(ok("return after silence", f"after {time.monotonic() - begun:.1f} s"))
-    after.upgrade()
-    play.heard.append(after.heard)
-    greet(after)
+    play.let_in(after)
     return after
 
 

@@ -35,6 +35,8 @@ class Exchange:
 class Heard:
     """One connection. Times are ns of the judge's clock, in the order in which things came."""
 
+    life: int = 0
+    """How often the node had been started."""
     began_ns: int = 0
     """When the upgrade was answered."""
     hello: Hello | None = None

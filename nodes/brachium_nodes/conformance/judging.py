@@ -14,6 +14,8 @@ CLOCK_WITHIN = 0.0005
 OLD_S = 3.0
 """A batch that is not late holds a second or so, and has some hundred ms on the way."""
 PROMPT_NS = 100_000_000
+PATIENCE_NS = 1_000_000_000
+"""A question that others overtook by so much was not answered."""
 LEAST_STATUSES, MOST_STATUSES = 0.6, 2.0
 """A second, on a busy machine."""
 
@@ -83,10 +85,15 @@ def _device_time(heard: list[Heard]) -> Verdict:
 
 
 def _boot(heard: list[Heard]) -> Verdict:
-    boots = {one.hello.boot for one in heard if one.hello is not None}
-    if len(boots) <= 1 and sum(one.hello is not None for one in heard) < 2:
+    boots: dict[int, list[int]] = {}
+    for one in heard:
+        if one.hello is not None:
+            boots.setdefault(one.life, []).append(one.hello.boot)
+    again = [life for life in boots.values() if len(life) > 1]
+    if not again:
         return not_claimed("boot", "it never came a second time")
-    return judged("boot", f"{len(boots)} boot numbers" if len(boots) > 1 else "", f"always {boots.pop()}")
+    most = max(len(set(life)) for life in again)
+    return judged("boot", f"{most} boot numbers" if most > 1 else "", f"one over {len(again[0])} connections")
 
 
 def _sequence(one: Heard) -> Verdict:
@@ -134,9 +141,10 @@ def _answered(one: Heard) -> Verdict:
         return failed("clock answered", one.faults["clock answered"])
     if asked and not one.exchanges:
         return failed("clock answered", f"no answer to {asked} questions")
-    left = len(one.asked)
+    newest_ns = max((e.asked_ns for e in one.exchanges), default=0)
+    left = sum(asked_ns < newest_ns - PATIENCE_NS for asked_ns in one.asked.values())
     return judged(
-        "clock answered", f"{left} of {asked} without an answer" if left > 1 else "", f"{asked} questions"
+        "clock answered", f"{left} of {asked} without an answer" if left else "", f"{asked} questions"
     )
 
 

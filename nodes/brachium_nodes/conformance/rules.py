@@ -39,6 +39,19 @@ RULES: dict[str, str] = {
     "proof": "finds a gateway by itself, and gives its token only to one that proves itself",
 }
 
+NEEDS: dict[str, tuple[str, ...]] = {
+    "frames": tuple(
+        rule for rule in RULES if rule not in ("request", "token", "back-off", "hello", "frames", "proof")
+    ),
+    "batches": ("sequence", "device time", "rate", "fresh", "unknown", "late", "drops", "bye"),
+    "sequence": ("drops",),
+    "device time": ("rate", "fresh", "late"),
+    "clock order": ("fresh", "late"),
+    "clock prompt": ("no delay",),
+    "return after close": ("keep",),
+}
+"""What cannot be told of a node that breaks a rule: by what it breaks."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Verdict:

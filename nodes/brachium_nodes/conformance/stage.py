@@ -82,11 +82,14 @@ class Caller:
         """Send a frame."""
         self._write(ws.frame(kind, payload))
 
-    def ask(self) -> None:
-        """Ask for the clock."""
-        self._next_id = (self._next_id + 1) & 0xFFFF
-        self.heard.asked[self._next_id] = time.monotonic_ns()
-        self.say(ClockAsk(id=self._next_id))
+    def ask(self, times: int = 1) -> None:
+        """Ask for the clock, so many times at once."""
+        asks = b""
+        for _ in range(times):
+            self._next_id = (self._next_id + 1) & 0xFFFF
+            self.heard.asked[self._next_id] = time.monotonic_ns()
+            asks += ws.frame(ws.BINARY, encode(ClockAsk(id=self._next_id)))
+        self._write(asks)
 
     def attend(
         self, seconds: float, *, ask: bool = True, until: Callable[[Heard], object] | None = None
@@ -154,6 +157,9 @@ class Stage:
 
     def __init__(self) -> None:
         self._door: socket.socket | None = None
+        self._ways: list[socket.socket] = []
+        self.first: Caller | None = None
+        """One that called already and is to be accepted next."""
         self.port = 0
         self.open()
 
@@ -169,13 +175,23 @@ class Stage:
             self._door.close()
             self._door = None
 
+    def end(self) -> None:
+        """Shut the door, and end what is still open."""
+        self.shut()
+        for way in self._ways:
+            way.close()
+
     def accept(self, within_s: float) -> Caller | None:
         """Return the next that calls and asks for something, None when nobody does in time."""
+        first, self.first = self.first, None
+        if first is not None:
+            return first
         end_s = time.monotonic() + within_s
         while self._door is not None and (left_s := end_s - time.monotonic()) > 0.0:
             if not select.select([self._door], [], [], min(left_s, 0.1))[0]:
                 continue
             way, _ = self._door.accept()
+            self._ways.append(way)
             head = _head(way)
             if head is not None:
                 return Caller(way, head)

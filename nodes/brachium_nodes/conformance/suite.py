@@ -3,7 +3,7 @@
 from brachium_nodes.conformance import judging
 from brachium_nodes.conformance.acts import ACTS, Play, door
 from brachium_nodes.conformance.outage import goodbye, outage
-from brachium_nodes.conformance.rules import RULES, Verdict, failed, not_claimed
+from brachium_nodes.conformance.rules import NEEDS, RULES, Verdict, failed, not_claimed
 from brachium_nodes.conformance.seeking import proof
 from brachium_nodes.conformance.stage import Stage
 from brachium_nodes.conformance.trial import Trial
@@ -30,7 +30,7 @@ def judge(trial: Trial, seek_port: int | None = None) -> list[Verdict]:
         goodbye(play, caller)
     finally:
         trial.stop()
-        stage.shut()
+        stage.end()
     return _in_order([*play.verdicts, *judging.quiet(trial.quiet), *judging.over_all(play.heard, trial.node)])
 
 
@@ -45,4 +45,13 @@ def _in_order(verdicts: list[Verdict]) -> list[Verdict]:
         if worst is None and rule == "proof":
             worst = not_claimed(rule, "no port is given where it asks")
         made.append(worst or failed(rule, "the trial did not come so far"))
-    return made
+    broken = {verdict.rule for verdict in made if verdict.outcome == "failed"}
+    return [_told(verdict, broken) for verdict in made]
+
+
+def _told(verdict: Verdict, broken: set[str]) -> Verdict:
+    """Leave a failure out that may come of another one alone."""
+    causes = [cause for cause, rules in NEEDS.items() if cause in broken and verdict.rule in rules]
+    if verdict.outcome != "failed" or not causes:
+        return verdict
+    return not_claimed(verdict.rule, f"cannot be told as long as {causes[0]!r} fails")

@@ -32,9 +32,9 @@ class Patience:
     """The door is shut: longer than a node keeps samples."""
     start_s: float = 20.0
     """From its command to its first call."""
-    return_s: float = 40.0
+    return_s: float = 50.0
     """From a broken connection to the next call: the longest pause, with some chance in it."""
-    silence_s: float = 25.0
+    silence_s: float = 65.0
     """From the last word of a gateway to the node's next call."""
     bye_s: float = 5.0
 
@@ -56,6 +56,7 @@ class Trial:
     """What the node says on its output goes here."""
     quiet: Heard = field(default_factory=Heard)
     """What was heard undisturbed."""
+    starts: int = 0
     _process: "subprocess.Popen[bytes] | None" = None
 
     def words(self) -> list[str]:
@@ -74,6 +75,7 @@ class Trial:
     def start(self) -> None:
         """Start the command, after ending what ran before. Raises ValueError when there is none such."""
         self.stop()
+        self.starts += 1
         environment = {**os.environ, **{VARIABLES[name]: value for name, value in self._named().items()}}
         with (self.log or Path(os.devnull)).open("ab") as said:
             try:
