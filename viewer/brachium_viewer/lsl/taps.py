@@ -13,7 +13,7 @@ Floats = npt.NDArray[np.float64]
 Times = npt.NDArray[np.int64]
 
 JOLT = 5.0
-"""m/s^2 by which the acceleration's size leaves that around it. A firm tap shows 10 to 50 at 50 to 100 Hz."""
+"""m/s^2 by which the acceleration leaves that around it. A firm tap shows 10 to 50 at 50 to 100 Hz."""
 REST = 1.5
 """m/s^2: more than this beside the taps is movement, in which taps are not looked for."""
 AROUND_S = 0.15
@@ -44,7 +44,7 @@ def triple_taps(times_ns: Times, acc: Floats) -> list[TripleTap]:
     if len(times_ns) < 3:
         return []
     seconds = (times_ns - times_ns[0]) * 1e-9
-    jolt = _jolts(seconds, np.sqrt((acc * acc).sum(axis=1)))
+    jolt = _jolts(seconds, acc)
     peaks = _peaks(seconds, jolt)
     found: list[TripleTap] = []
     at = 0
@@ -59,13 +59,14 @@ def triple_taps(times_ns: Times, acc: Floats) -> list[TripleTap]:
     return found
 
 
-def _jolts(seconds: Floats, size: Floats) -> Floats:
-    """Return by how much each sample's acceleration leaves that around it."""
+def _jolts(seconds: Floats, acc: Floats) -> Floats:
+    """Return by how much each sample's acceleration leaves that around it (n,): in any direction, for a tap
+    across gravity hardly changes its size."""
     period = float(np.median(np.diff(seconds)))
     reach = max(1, round(AROUND_S / period))
-    padded = np.pad(size, reach, mode="edge")
-    windows = np.lib.stride_tricks.sliding_window_view(padded, 2 * reach + 1)
-    jolts: Floats = np.abs(size - np.median(windows, axis=1))
+    padded = np.pad(acc, ((reach, reach), (0, 0)), mode="edge")
+    windows = np.lib.stride_tricks.sliding_window_view(padded, 2 * reach + 1, axis=0)
+    jolts: Floats = np.sqrt(((acc - np.median(windows, axis=2)) ** 2).sum(axis=1))
     return jolts
 
 
