@@ -58,7 +58,7 @@ class FaultReport:
 def measure() -> FaultReport:
     """Break each thing once, in networks of real processes on this machine."""
     kinds: list[tuple[str, float]] = [("jump", deg) for deg in JUMPS_DEG]
-    kinds += [("node killed", 0.0), ("fusion killed", 0.0), ("router killed", 0.0)]
+    kinds += [("field turned", 60.0), ("node killed", 0.0), ("fusion killed", 0.0), ("router killed", 0.0)]
     found, again = list[FaultFigures](), 0
     with tempfile.TemporaryDirectory() as folder:
         while kinds:
@@ -97,10 +97,9 @@ def one_round(folder: Path, kind: str, jump_deg: float) -> FaultFigures:
                 words = ["--endpoint", endpoint, "--room", ROOM, "--token", TOKEN, "--subject", "p01"]
                 words += ["--gateway", f"ws://127.0.0.1:{gateway}/node", "--segment", segment]
                 words += ["--start-ns", str(start_ns)]
-                if kind == "jump":
-                    words += ["--turned"]
-                    if segment == "forearm_r":
-                        words += ["--jump-s", str(FAULT_S), "--jump-deg", str(jump_deg)]
+                words += ["--turned"] if kind == "jump" else []
+                if jump_deg and segment == "forearm_r":
+                    words += ["--jump-s", str(FAULT_S), "--jump-deg", str(jump_deg)]
                 if segment == "upper_arm_r":
                     words += ["--truth"]
                 name = f"node-{segment}"
@@ -110,7 +109,7 @@ def one_round(folder: Path, kind: str, jump_deg: float) -> FaultFigures:
             told = _told(truth)
             fault_ns = _break(kind, services, nodes, fault_ns)
             time.sleep(AFTER_S)
-        fault = f"{kind} {jump_deg:+.0f} deg" if kind == "jump" else kind
+        fault = f"{kind} {jump_deg:+.0f} deg" if jump_deg else kind
         return figures(fault, heard, clock.at(0), start_ns, fault_ns, told)
 
 
@@ -192,8 +191,8 @@ def _told(truth: Inbox) -> list[Skeleton]:
 
 def _break(kind: str, services: Processes, nodes: Processes, planned_ns: int) -> int:
     """Break it; return when it broke, by the monotonic clock."""
-    if kind == "jump":
-        return planned_ns  # the first sample with the other heading
+    if kind in ("jump", "field turned"):
+        return planned_ns  # the first sample with the other heading, or field
     where, name = {
         "node killed": (nodes, "node-forearm_r"),
         "fusion killed": (services, "fuse"),

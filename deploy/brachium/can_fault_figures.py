@@ -16,7 +16,7 @@ from brachium_wire.messages import Skeleton
 
 BEFORE_MS, GRACE_MS = 3000.0, 50.0
 WRONG_DEG = 5.0
-TRUTH_S = 20.0
+TRUTH_S = 30.0
 """Longer than any round lasts."""
 LABELS = {name: "".join(word.capitalize() for word in name.split("_")) for name in JOINTS}
 """What a joint is called in the database."""

@@ -1,7 +1,8 @@
 """One node of an emulated wearer, as a process that can be killed: `python -m brachium.can_wearer`.
 
 All nodes of a wearer are told the same moment of the monotonic clock as true time 0. With a jump, every node
-gives orientations in place of raw samples, and one's heading is another from a moment on.
+gives orientations in place of raw samples, and one's heading is another from a moment on; or the nodes give
+raw samples, and one's magnetic field is turned.
 """
 
 import argparse
@@ -10,6 +11,7 @@ import itertools
 import logging
 import threading
 from collections.abc import Iterator
+from dataclasses import replace
 
 import msgspec
 import numpy as np
@@ -65,6 +67,20 @@ def orientations(stream: NodeStream, of: Wearer, jump_s: float | None, jump_deg:
         yield Outgoing(packet.due_s, batch, packet.times_s)
 
 
+def led_away(stream: NodeStream, of: Wearer, from_s: float, by_deg: float) -> Iterator[Outgoing]:
+    """Yield a node's raw packets, the field that it measures turned about the vertical from `from_s` on."""
+    for packet in stream.packets:
+        mag = packet.batch.mag
+        if mag is None or packet.times_s[0] < from_s:
+            yield packet
+            continue
+        attitude = of.truth(packet.times_s, "right").world_from_sensor[stream.segment]
+        field = rotation.rotate(attitude, np.frombuffer(mag, "<f4").reshape(-1, 3).astype(np.float64))
+        turned = rotation.rotate(rotation.about(2, np.radians(by_deg)), field)
+        block = rotation.rotate(rotation.inverse(attitude), turned).astype("<f4").tobytes()
+        yield replace(packet, batch=msgspec.structs.replace(packet.batch, mag=block))
+
+
 def stream_of(
     subject: str, segment: str, *, turned: bool, jump_s: float | None, jump_deg: float
 ) -> NodeStream:
@@ -72,6 +88,8 @@ def stream_of(
     of = wearer((segment,))
     (stream,) = node_streams(subject, of, FaultSettings(), boot=1)
     if not turned:
+        if jump_s is not None:
+            stream = replace(stream, packets=led_away(stream, of, jump_s, jump_deg))
         return stream
     hello = msgspec.structs.replace(
         stream.hello, orientation_only=True, magnetometer=False, chip="orientation"

@@ -88,6 +88,22 @@ def test_a_node_of_orientations_turns_at_its_jump_and_at_no_other_time():
     assert Appointed(7).start_ns == 7
 
 
+def test_a_field_that_is_turned_keeps_its_strength_and_its_dip():
+    plain, turned = (
+        list(islice(stream_of("p01", "forearm_r", turned=False, jump_s=s, jump_deg=60.0).packets, 40))
+        for s in (None, 0.4)
+    )
+    fields = [
+        np.concatenate([np.frombuffer(p.batch.mag, "<f4").reshape(-1, 3) for p in packets])
+        for packets in (plain, turned)
+    ]
+    times = np.concatenate([p.times_s for p in plain])
+    apart = np.linalg.norm(fields[0] - fields[1], axis=1)
+    assert (apart[times < 0.38] == 0.0).all()
+    assert (apart[times > 0.42] > 10.0).all()  # uT
+    np.testing.assert_allclose(*(np.linalg.norm(f, axis=1) for f in fields), rtol=1e-5)
+
+
 def test_samples_of_two_are_found():
     whole = Sample(1.0, 0, {"acc": (1.0,), "gyr": (1.0,)})
     mixed = Sample(2.0, 0, {"acc": (2.0,), "gyr": (1.0,)})

@@ -1,6 +1,7 @@
 """One sensor on the bus: its frames in, batches for its segment out. Pure: bytes and times are arguments."""
 
 from collections import Counter
+from collections.abc import Callable
 from itertools import chain
 from math import hypot
 from struct import pack
@@ -17,6 +18,7 @@ from brachium_wire.samples import read_samples
 
 Part = tuple[Quantity, tuple[str, ...], float]
 """A quantity, its signals, and what makes SI of them."""
+Receive = Callable[[bytes | bytearray, int], list[SampleBatch]]
 GONE_NS = 3_000_000_000
 """A sensor that was silent for so long is not connected; the status topic is stale after as long."""
 HOLD_NS = 100_000_000
@@ -57,25 +59,33 @@ class CanImu:
         self.drops: Counter[str] = Counter()
         self._counted, self._counted_ns = 0, 0
 
-    def receive(self, message: str, data: bytes | bytearray, now_ns: int) -> list[SampleBatch]:
-        """Take a frame of this sensor that came at host time `now_ns`; `message` is its DBC's name."""
+    def receiver(self, message: str) -> Receive | None:
+        """Return what takes the frames of one of its messages, with host times; None where none is wanted."""
         read = self._reads.get(message)
         if read is None:
-            return []  # measured, and not asked for
-        try:
-            values = read(data)
-        except ShortFrame:
-            self.drops["bad_frame"] += 1
-            return []
-        if self._grouper is None:
-            return self._take(Sample(self._next, now_ns, {message: values}), now_ns)
+            return None  # measured, and not asked for
+        feed = self._feed(message)
+
+        def receive(data: bytes | bytearray, now_ns: int) -> list[SampleBatch]:
+            try:
+                samples = feed(read(data), now_ns)
+            except ShortFrame:
+                self.drops["bad_frame"] += 1
+                return []
+            return [batch for sample in samples for batch in self._take(sample, now_ns)] if samples else []
+
+        return receive
+
+    def _feed(self, message: str) -> Callable[[Values, int], list[Sample]]:
+        """Return what takes the numbers of a message, its key first where it has one."""
+        grouper = self._grouper
+        if grouper is None:
+            return lambda values, now_ns: [Sample(self._next, now_ns, {message: values})]
         if message == self.sensor.before:
-            samples = self._grouper.key(values[0], now_ns)
-        elif self.sensor.before is None:
-            samples = self._grouper.member(message, values[1:], now_ns, values[0])
-        else:
-            samples = self._grouper.member(message, values, now_ns)
-        return [batch for sample in samples for batch in self._take(sample, now_ns)] if samples else []
+            return lambda values, now_ns: grouper.key(values[0], now_ns)
+        if self.sensor.before is None:
+            return lambda values, now_ns: grouper.member(message, values[1:], now_ns, values[0])
+        return lambda values, now_ns: grouper.member(message, values, now_ns)
 
     def tick(self, now_ns: int) -> list[SampleBatch]:
         """Give up what waits in vain, and send what waits for its batch to fill."""

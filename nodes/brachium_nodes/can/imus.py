@@ -40,7 +40,7 @@ class CanImus:
         self._news = CalibrationNews(bus, room, self._known)
         self._imus = [CanImu(sensor, batch) for sensor in sensors]
         self._by_id = {
-            number: (imu, message.name)
+            number: (imu, imu.receiver(message.name))
             for imu in self._imus
             for number, message in imu.sensor.messages.items()
         }
@@ -59,9 +59,10 @@ class CanImus:
             if len(self.strange) < MAX_STRANGE:
                 self.strange.add(number)
             return
-        imu, message = found
-        for batch in imu.receive(message, data, now_ns):
-            self._publish(imu, batch)
+        imu, receive = found
+        if receive is not None:
+            for batch in receive(data, now_ns):
+                self._publish(imu, batch)
 
     def tick(self, now_ns: int) -> None:
         """Do what time asks for; call it every 10 ms or so."""

@@ -90,8 +90,8 @@ class Port:
             self._no_data(frame)
             return None
         self._taken += 1
-        number = frame.arbitration_id | (EXTENDED if frame.is_extended_id else 0)
-        return number, frame.data
+        number = frame.arbitration_id
+        return (number | EXTENDED if frame.is_extended_id else number), frame.data
 
     def send(self, number: int, data: bytes, *, fd: bool = False) -> bool:
         """Send a frame; return whether the interface took it."""

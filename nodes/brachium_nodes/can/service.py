@@ -90,20 +90,26 @@ class _Service:
 
     def run(self, stop: threading.Event) -> None:
         """Take frames as they come; look after everything else at its time."""
-        look_s = send_s = now_s = time.monotonic()
+        receive = self._port.receive
+        taken = (lambda _number, _data, _now_ns: None) if self._imus is None else self._imus.receive
+        host_ns = self._clock.at(0)
+        look_s = send_s = due_s = now_s = time.monotonic()
         while not stop.is_set():
-            due_s = look_s if self._sender is None else min(look_s, send_s)
-            frame = self._port.receive(max(due_s - now_s, 0.0))
+            frame = receive(due_s - now_s)
             now_ns = time.monotonic_ns()
+            if frame is not None:
+                taken(frame[0], frame[1], host_ns + now_ns)
             now_s = 1e-9 * now_ns
-            if frame is not None and self._imus is not None:
-                self._imus.receive(*frame, self._clock.at(now_ns))
+            if now_s < due_s:
+                continue
             if self._sender is not None and now_s >= send_s:
                 self._sender.tick(self._port)
                 send_s = max(send_s + self._send_s, now_s)  # late frames are left out, not caught up
             if now_s >= look_s:
                 look_s = now_s + LOOK_S
                 self._look()
+            due_s = look_s if self._sender is None else min(look_s, send_s)
+            now_s = min(time.monotonic(), due_s)
         self._end()
 
     def _look(self) -> None:

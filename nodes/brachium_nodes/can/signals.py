@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from struct import Struct
-from typing import Any
+from typing import Any, Literal
 
 Read = Callable[[bytes | bytearray], tuple[float, ...]]
 
@@ -16,11 +16,18 @@ class ShortFrame(ValueError):
 def reader(message: Any, wanted: Sequence[tuple[str, float]]) -> Read:
     """Return what reads signals of a cantools message from a frame, each times a factor.
 
-    Raises ValueError for a signal that is not always there (multiplexed).
+    Raises ValueError for a signal that is not always there (multiplexed), floats of half length, and signals
+    of both byte orders.
     """
     length, places = message.length, []
+    signals = {signal.name: signal for signal in message.signals}
+    orders = {signals[name].byte_order for name, _ in wanted}
+    if len(orders) != 1:
+        raise ValueError(f"{message.name}: signals of both byte orders; those of one are read")
+    little = orders == {"little_endian"}
+    order: Literal["little", "big"] = "little" if little else "big"
     for name, factor in wanted:
-        signal = next(s for s in message.signals if s.name == name)
+        signal = signals[name]
         if signal.multiplexer_ids:
             raise ValueError(
                 f"{message.name}: signal {name} is multiplexed; one that is always there is needed"
@@ -28,24 +35,25 @@ def reader(message: Any, wanted: Sequence[tuple[str, float]]) -> Read:
         bits = signal.length
         if signal.is_float and bits not in _FLOAT:
             raise ValueError(f"{message.name}: signal {name} is a float of {bits} bits; 32 and 64 are read")
-        little = signal.byte_order == "little_endian"
         # A big-endian signal's start is its highest bit, counted upwards within each byte.
         first = 8 * (signal.start // 8) + 7 - signal.start % 8
         shift = signal.start if little else 8 * length - first - bits
         sign = 1 << bits - 1 if signal.is_signed and not signal.is_float else 0
         scale, offset = float(signal.scale) * factor, float(signal.offset) * factor
-        places.append((little, shift, (1 << bits) - 1, sign, scale, offset, signal.is_float))
+        places.append((shift, (1 << bits) - 1, sign, scale, offset, signal.is_float))
 
     def read(data: bytes | bytearray) -> tuple[float, ...]:
-        if len(data) < length:
-            raise ShortFrame(f"{message.name} has {length} bytes; came {len(data)}")
-        little_bits = int.from_bytes(data, "little")
-        big_bits = int.from_bytes(data[:length], "big")
+        if len(data) != length:
+            if len(data) < length:
+                raise ShortFrame(f"{message.name} has {length} bytes; came {len(data)}")
+            data = data[:length]
+        whole = int.from_bytes(data, order)
         return tuple(
             [
-                scale * (_float(raw, mask) if is_float else (raw ^ sign) - sign) + offset
-                for little, shift, mask, sign, scale, offset, is_float in places
-                for raw in ((little_bits if little else big_bits) >> shift & mask,)
+                scale
+                * (_float(whole >> shift & mask, mask) if is_float else (whole >> shift & mask ^ sign) - sign)
+                + offset
+                for shift, mask, sign, scale, offset, is_float in places
             ]
         )
 
