@@ -28,6 +28,7 @@ __all__ = [
     "RecordingWriter",
     "RecoverReport",
     "counts",
+    "is_being_written",
     "is_closed",
     "is_recording",
     "read",
@@ -170,6 +171,12 @@ def is_closed(path: Path) -> bool:
             return False
         file.seek(-len(MAGIC), os.SEEK_END)
         return file.read() == MAGIC
+
+
+def is_being_written(path: Path) -> bool:
+    """Return whether another process has the recording open for writing."""
+    with path.open("rb") as file:
+        return not _lock(file)
 
 
 def recover(path: Path) -> RecoverReport:

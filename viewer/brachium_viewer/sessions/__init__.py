@@ -1,0 +1,1 @@
+"""Subjects and their sessions, kept in one folder beside the recordings."""

@@ -1,0 +1,105 @@
+"""The tables of a store, and how the file that holds them is opened."""
+
+import sqlite3
+from pathlib import Path
+
+from brachium_viewer.sessions.records import StoreError
+
+FILE = "sessions.sqlite"
+APPLICATION = 0x42524348
+"""Marks a SQLite file as ours ("BRCH")."""
+VERSION = 1
+"""Of the tables below; a file with a greater one is of a newer Brachium and is refused."""
+BUSY_S = 10.0
+"""So long a process waits for another one that writes."""
+
+TABLES = """
+CREATE TABLE subject (
+    pseudonym TEXT PRIMARY KEY,
+    affected_side TEXT NOT NULL,
+    dominant_hand TEXT NOT NULL,
+    lengths_m TEXT NOT NULL,
+    notes TEXT NOT NULL
+) STRICT;
+CREATE TABLE session (
+    id INTEGER PRIMARY KEY,
+    subject TEXT NOT NULL REFERENCES subject ON DELETE CASCADE,
+    started_ns INTEGER NOT NULL,
+    origin TEXT NOT NULL CHECK (origin IN ('worn', 'emulated', 'playback')),
+    recording TEXT NOT NULL,
+    settings TEXT NOT NULL,
+    method INTEGER NOT NULL,
+    note TEXT NOT NULL
+) STRICT;
+CREATE UNIQUE INDEX session_of_recording ON session (subject, recording) WHERE recording <> '';
+CREATE TABLE exercise_set (
+    session INTEGER NOT NULL REFERENCES session ON DELETE CASCADE,
+    number INTEGER NOT NULL,
+    exercise TEXT NOT NULL,
+    side TEXT NOT NULL,
+    mode TEXT NOT NULL,
+    from_ns INTEGER NOT NULL,
+    to_ns INTEGER NOT NULL,
+    donning INTEGER NOT NULL,
+    record TEXT NOT NULL,
+    PRIMARY KEY (session, number)
+) STRICT;
+CREATE INDEX set_of_exercise ON exercise_set (exercise, side, mode);
+CREATE TABLE rating (
+    session INTEGER NOT NULL REFERENCES session ON DELETE CASCADE,
+    kind TEXT NOT NULL,
+    moment TEXT NOT NULL,
+    value INTEGER NOT NULL CHECK (value BETWEEN 0 AND 10),
+    time_ns INTEGER NOT NULL
+) STRICT;
+CREATE TABLE deleting (subject TEXT PRIMARY KEY) STRICT;
+"""
+"""`record` and `settings` are JSON. `deleting` names subjects whose deletion has begun: it is finished by
+whoever opens the store next."""
+
+
+def connect(folder: Path) -> sqlite3.Connection:
+    """Open the folder's file, making its tables when it is new.
+
+    Raises StoreError for a file that is not a store, or one of a newer Brachium.
+    """
+    path = folder / FILE
+    connection = sqlite3.connect(path, timeout=BUSY_S, isolation_level=None, check_same_thread=False)
+    try:
+        connection.row_factory = sqlite3.Row
+        connection.execute("PRAGMA journal_mode = WAL")
+        connection.execute("PRAGMA synchronous = FULL")
+        connection.execute("PRAGMA foreign_keys = ON")
+        connection.execute("PRAGMA secure_delete = ON")  # what is deleted is overwritten
+        _settle(connection, path)
+    except sqlite3.DatabaseError as error:
+        connection.close()
+        raise StoreError(f"{path}: no store of sessions ({error}); choose another folder") from None
+    except StoreError:
+        connection.close()
+        raise
+    return connection
+
+
+def _settle(connection: sqlite3.Connection, path: Path) -> None:
+    connection.execute("BEGIN IMMEDIATE")  # two processes may come to a new folder at once
+    try:
+        version = int(connection.execute("PRAGMA user_version").fetchone()[0])
+        owner = int(connection.execute("PRAGMA application_id").fetchone()[0])
+        tables = int(connection.execute("SELECT count(*) FROM sqlite_master").fetchone()[0])
+        if tables and owner != APPLICATION:
+            raise StoreError(f"{path}: a SQLite file of another program; choose another folder")
+        if version > VERSION:
+            raise StoreError(
+                f"{path}: written by a newer Brachium (tables of version {version}; "
+                f"this one knows {VERSION}); update Brachium"
+            )
+        if not tables:
+            for statement in TABLES.split(";"):
+                connection.execute(statement)
+            connection.execute(f"PRAGMA application_id = {APPLICATION}")
+            connection.execute(f"PRAGMA user_version = {VERSION}")
+    except BaseException:
+        connection.execute("ROLLBACK")
+        raise
+    connection.execute("COMMIT")
