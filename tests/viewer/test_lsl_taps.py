@@ -1,5 +1,8 @@
 """Three taps on an emulated sensor: found where they were, and nowhere else."""
 
+import os
+from pathlib import Path
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -15,6 +18,7 @@ from brachium_wire import keys, recording
 from brachium_wire.codec import encode
 from brachium_wire.samples import write_samples
 
+DATA = Path(os.environ.get("BRACHIUM_DATA", Path(__file__).parents[3] / "shared" / "data"))
 START = 1_790_000_000_000_000_000
 FINE_HZ = 4000.0
 CUTOFF_HZ = {50.0: 20.0, 100.0: 44.0, 200.0: 92.0}
@@ -123,6 +127,29 @@ def write(path, subject, segment, times, acc):
             )
             writer.write(keys.imu("lab", subject, segment), encode(batch), batch.received_ns)
         writer.write(keys.imu("lab", subject, segment), b"\xc1", int(times[-1]))
+
+
+def test_a_capture_folders_taps_are_found_too(tmp_path):
+    times, acc = tapped([2.0, 2.3, 2.6])
+    rows = ["t,ax,ay,az,gx,gy,gz"]
+    rows += [
+        ",".join(map(repr, [100.0 + float(t - START) * 1e-9, *a.tolist(), 0.0, 0.0, 0.0]))
+        for t, a in zip(times, acc, strict=True)
+    ]
+    (tmp_path / "forearm_r.csv").write_text("\n".join(rows) + "\n")
+    (found,) = taps_in(tmp_path, camera_s=5.0)
+    assert (found.subject, found.segment) == ("capture", "forearm_r")
+    assert found.first_s == pytest.approx(2.0, abs=0.03)
+    assert found.camera_lag_s == pytest.approx(5.0 - found.first_s)
+
+
+@pytest.mark.data
+def test_real_recordings_hold_jolts_but_no_three_taps():
+    """Among them a person who walks, and a sensor that is tapped again and again while it is moved."""
+    folders = [folder for folder in DATA.glob("*") if (folder / "capture.toml").is_file()]
+    if not folders:
+        pytest.skip(f"no recordings in {DATA}; set BRACHIUM_DATA to the folder that holds them")
+    assert {folder.name: taps_in(folder) for folder in folders} == {folder.name: [] for folder in folders}
 
 
 def test_a_recordings_taps_give_the_cameras_lag(tmp_path):

@@ -28,7 +28,10 @@ def configure(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--id", default="lsl", help="names the service")
     parser.add_argument(
-        "--taps", type=Path, metavar="FILE.mcap", help="find where a sensor was tapped three times, and end"
+        "--taps",
+        type=Path,
+        metavar="INPUT",
+        help="find where a sensor was tapped three times in a recording or a capture folder, and end",
     )
     parser.add_argument(
         "--camera",
@@ -43,7 +46,7 @@ def run(args: argparse.Namespace) -> int:
     if args.taps is not None:
         return _taps(args)
     if args.camera is not None or args.json:
-        raise Usage("--camera and --json belong to --taps FILE.mcap; write that too, or leave them out")
+        raise Usage("--camera and --json belong to --taps INPUT; write that too, or leave them out")
     from brachium_viewer.lsl import service
 
     settings = service.LslSettings(

@@ -1,15 +1,18 @@
 """Triple taps in a recording's raw accelerations, and how far a camera's time is from the samples'."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
-from brachium_viewer.lsl.taps import Floats, triple_taps
-from brachium_wire import keys, recording
+from brachium_viewer.lsl.taps import Floats, Times, triple_taps
+from brachium_wire import capture, keys, recording
 from brachium_wire.codec import WireError, decode_topic
 from brachium_wire.messages import SampleBatch
 from brachium_wire.samples import read_samples
+
+CAPTURE = "capture"
+"""Stands for the subject of a capture folder, which names none."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -27,37 +30,48 @@ class Tapped:
 
 
 def taps_in(path: Path, camera_s: float | None = None) -> list[Tapped]:
-    """Return the triple taps of a recording in order of time.
+    """Return the triple taps of a recording or a capture folder, in order of time.
 
     `camera_s` is the time in a camera's film at which the first tap of the first of them is seen.
-    Raises recording.RecordingError for a file that is none.
+    Raises recording.RecordingError, or CaptureError for a folder that is no capture.
     """
-    found: list[Tapped] = []
-    streams = _accelerations(path)
-    zero = {subject: min(s[0][0] for (w, _), s in streams.items() if w == subject) for subject, _ in streams}
-    for (subject, segment), (times, acc) in streams.items():
-        order = np.unique(np.array(times, dtype=np.int64), return_index=True)[1]
-        for taps in triple_taps(np.array(times, dtype=np.int64)[order], np.concatenate(acc)[order]):
-            first_s = (taps.times_ns[0] - zero[subject]) * 1e-9
-            found.append(Tapped(subject=subject, segment=segment, times_ns=taps.times_ns, first_s=first_s))
-    found.sort(key=lambda one: one.times_ns)
-    if camera_s is None:
-        return found
-    return [
+    streams = _captured(path) if path.is_dir() else _recorded(path)
+    zero_ns: dict[str, int] = {}
+    for (subject, _), (times, _acc) in streams.items():
+        zero_ns[subject] = min(zero_ns.get(subject, int(times[0])), int(times[0]))
+    found = [
         Tapped(
-            subject=one.subject,
-            segment=one.segment,
-            times_ns=one.times_ns,
-            first_s=one.first_s,
-            camera_lag_s=camera_s - (found[0].times_ns[0] - zero[one.subject]) * 1e-9,
+            subject=subject,
+            segment=segment,
+            times_ns=taps.times_ns,
+            first_s=(taps.times_ns[0] - zero_ns[subject]) * 1e-9,
         )
-        for one in found
+        for (subject, segment), (times, acc) in streams.items()
+        for taps in triple_taps(times, acc)
     ]
+    found.sort(key=lambda one: one.times_ns)
+    if camera_s is None or not found:
+        return found
+    seen_ns = found[0].times_ns[0]
+    return [replace(one, camera_lag_s=camera_s - (seen_ns - zero_ns[one.subject]) * 1e-9) for one in found]
 
 
-def _accelerations(path: Path) -> dict[tuple[str, str], tuple[list[int], list[Floats]]]:
-    """Return times and raw accelerations of every sensor, late samples too, as they came."""
-    streams: dict[tuple[str, str], tuple[list[int], list[Floats]]] = {}
+_Streams = dict[tuple[str, str], tuple[Times, Floats]]
+"""By subject and segment: times (n,) ns that grow, and raw accelerations (n, 3)."""
+
+
+def _captured(folder: Path) -> _Streams:
+    segments = capture.load(folder).segments
+    return {
+        (CAPTURE, name): (np.rint(one.t * 1e9).astype(np.int64), one.acc)
+        for name, one in segments.items()
+        if one.acc is not None
+    }
+
+
+def _recorded(path: Path) -> _Streams:
+    """Return what every sensor sent, late samples too."""
+    came: dict[tuple[str, str], list[tuple[list[int], Floats]]] = {}
     with recording.read(path) as reading:
         for key, payload, _ in reading:
             try:
@@ -70,7 +84,10 @@ def _accelerations(path: Path) -> dict[tuple[str, str], tuple[list[int], list[Fl
             except (keys.BadKey, WireError):
                 continue  # a recording holds what came, sound or not
             if samples.acc is not None:
-                times, acc = streams.setdefault((parsed.subject, parsed.detail), ([], []))
-                times += samples.time_ns
-                acc.append(samples.acc)
+                came.setdefault((parsed.subject, parsed.detail), []).append((samples.time_ns, samples.acc))
+    streams: _Streams = {}
+    for who, batches in came.items():
+        times = np.concatenate([np.array(t, dtype=np.int64) for t, _ in batches])
+        times, order = np.unique(times, return_index=True)
+        streams[who] = times, np.concatenate([acc for _, acc in batches])[order]
     return streams
