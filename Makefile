@@ -48,7 +48,7 @@ wheel: $(VENV)/dev.stamp
 lock:
 	test -x build/lock/bin/uv || ($(PYTHON) -m venv build/lock && build/lock/bin/pip install -q uv)
 	build/lock/bin/uv pip compile $(LOCK) pyproject.toml --extra demo --group build -o requirements/demo.txt
-	build/lock/bin/uv pip compile $(LOCK) pyproject.toml --extra demo --extra can --extra micropython --group dev -o requirements/dev.txt
+	build/lock/bin/uv pip compile $(LOCK) pyproject.toml --extra demo --extra can --extra lsl --extra micropython --group dev -o requirements/dev.txt
 
 # One lock for CPython 3.11 and later on every platform, the public index's hashes, no address.
 LOCK := -q --no-config --universal --python-version 3.11 --generate-hashes --no-emit-index-url --no-header --upgrade
