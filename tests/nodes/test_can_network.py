@@ -48,6 +48,7 @@ map = "lpms-orientation"
 subject = "p01"
 segment = "hand_r"
 add_to_ids = 2
+heading_free = true
 """
 
 
@@ -140,7 +141,10 @@ def test_sensors_of_two_makers_come_in_beside_a_babbling_node(endpoint: str, tmp
     info = decode(by_topic["info", "upper_arm_r"][0], Info)
     assert (info.node, info.chip, info.origin, info.host) == ("mti-1", "Xsens MTi-600", "worn", "can")
     assert info.magnetometer
-    assert decode(by_topic["info", "hand_r"][0], Info).orientation_only
+    turned_info = decode(by_topic["info", "hand_r"][0], Info)
+    assert turned_info.orientation_only
+    assert turned_info.heading_free
+    assert not info.heading_free
     batches = [read_samples(decode(p, SampleBatch)) for p in by_topic["imu", "upper_arm_r"]]
     numbers = [b.sequence + i for b in batches for i in range(len(b))]
     assert numbers == [n for n in range(39) if n != 20]  # the last waits for its follower

@@ -113,6 +113,7 @@ class CanImu:
             calibration=calibration,
             magnetometer=self.magnetometer,
             orientation_only=not self.raw,
+            heading_free=not self.raw and self.sensor.heading_free,
         )
 
     def status(self, now_ns: int) -> Status:

@@ -75,6 +75,8 @@ class SensorEntry(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     add_to_ids: int = 0
     mounting: Quaternion | None = None
     rate_hz: float | None = None
+    heading_free: bool = False
+    """It delivers orientation, and no magnetometer holds its heading."""
 
 
 class SensorTable(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):

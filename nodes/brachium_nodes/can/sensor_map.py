@@ -34,6 +34,7 @@ class CanSensor:
     segment: str
     mounting: Quaternion | None
     rate_hz: float
+    heading_free: bool
     map: SensorMap
     messages: Mapping[int, Any]
     """cantools messages of this sensor by the id they have on this bus; an extended id has bit 31 set."""
@@ -79,6 +80,7 @@ def _sensor(path: Path, entry: SensorEntry, dbc: Path | None) -> CanSensor:
         segment=entry.segment,
         mounting=entry.mounting,
         rate_hz=rate_hz,
+        heading_free=entry.heading_free,
         map=made,
         messages=messages,
         key=_key(place, made, wanted, rate_hz),
