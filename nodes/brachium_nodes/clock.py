@@ -107,7 +107,7 @@ class NodeClock:
             slope -= fading
         elif first_us < since_us + self._correction_span_us:
             return [us * 1000 + origin_ns + round(self._exact_ns(us)) for us in device_us]
-        return [us * 1000 + origin_ns + round(offset + slope * (us - origin_us)) for us in device_us]
+        return [us * 1000 + origin_ns + int(offset + slope * (us - origin_us)) for us in device_us]
 
     def publish(self, device_us: int) -> None:
         """Take that host times up to this device time are given away: later estimates join on to them."""

@@ -26,6 +26,7 @@ prepare(
     seconds=200.0,
     start_us=time.monotonic_ns() // 1000,
     gateway=f"ws://127.0.0.1:{port}/node",
+    longest_pause_s=2,
 )
 running = FirmwareNode.start(Path(folder), Build(Path(firmware), Path(board)))
 stop.wait()

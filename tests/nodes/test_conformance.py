@@ -40,8 +40,7 @@ def tried(wrong: str) -> list[Verdict]:
     return judge(Trial(command=words, node="n1", token="secret of n1", patience=QUICK), seek_port)
 
 
-# The firmware begins with short pauses again after 10 s of peace.
-REAL = Patience(start_s=60.0, listen_s=11.0, outage_s=3.0)
+REAL = Patience(start_s=60.0, listen_s=4.0, outage_s=3.0)
 FIRMWARE, EMULATED = "the firmware", "the emulated node"
 
 
