@@ -15,7 +15,7 @@ from brachium_nodes.can.arm_frames import ArmValue, JointValue, Reason
 from brachium_nodes.can.arm_output import SILENCE_NS, ArmOutput
 from brachium_nodes.can.joint_table import JOINTS, JointRow, JointTable, read_joints
 from brachium_nodes.can.map_files import BadMap
-from brachium_wire.messages import Quality, SegmentPose, Skeleton
+from brachium_wire.messages import Calibration, Quality, SegmentPose, Skeleton
 
 FILE = Path(arm_frames.__file__).with_name("brachium_arm.dbc")
 DBC = database.load_file(FILE)
@@ -220,8 +220,11 @@ def test_a_heading_that_jumps_is_invalid_at_once_and_until_a_calibration(
             assert now(made, tick)[ELBOW].reason in (Reason.SETTLING, Reason.IMPLAUSIBLE)
     assert {j.reason for j in now(made, 59)} == {Reason.IMPLAUSIBLE}
     assert made.jumped == ["forearm_r"]
-    made.calibrated(START_NS)
-    made.calibrated(START_NS)  # told twice
+    for state in ("done", "running", "refused", "done"):  # warnings are told with what was done before
+        made.hear(Calibration(time_ns=START_NS, state=state))
+        assert made.jumped
+    for state in ("waiting", "running", "done"):
+        made.hear(Calibration(time_ns=START_NS, state=state))
     for tick in range(60, 66):
         made.take(skeleton(tick, 0.02 * rate * tick, heading=sign * jump))
     assert now(made, 65)[ELBOW].reason is Reason.VALID

@@ -10,7 +10,7 @@ from math import pi, radians
 from brachium_nodes.can.arm_frames import ArmValue, JointValue, Reason, fits
 from brachium_nodes.can.joint_table import JOINTS, JointRow, JointTable
 from brachium_nodes.can.segment_watch import LONGEST_TICK_NS, SegmentWatch
-from brachium_wire.messages import Origin, Skeleton
+from brachium_wire.messages import Calibration, Origin, Skeleton
 
 SILENCE_NS = 38_000_000
 """After a skeleton, so long without the next is silence: with a frame each 10 ms, none is valid 50 ms after
@@ -34,19 +34,23 @@ class ArmOutput:
         self._watches = {s: SegmentWatch() for s in ("sternum", upper, forearm, hand)}
         self._last: Skeleton | None = None
         self._angles: list[deque[tuple[int, float]]] = [deque(maxlen=SPEED_TICKS + 1) for _ in JOINTS]
-        self._calibrated_ns: int | None = None
+        self._calibrating = False
 
     @property
     def jumped(self) -> list[str]:
         """Segments that jumped and were not calibrated since."""
         return [name for name, watch in self._watches.items() if watch.jumped]
 
-    def calibrated(self, time_ns: int) -> None:
-        """Take that the subject was calibrated or zeroed at this host time."""
-        if time_ns != self._calibrated_ns:
-            self._calibrated_ns = time_ns
+    def hear(self, calibration: Calibration) -> None:
+        """Take what fusion tells of the subject's calibration.
+
+        One that was under way and is done makes good what jumped. Done alone does not: fusion says it again
+        with every warning, such as that of a strap that slipped.
+        """
+        if calibration.state == "done" and self._calibrating:
             for watch in self._watches.values():
                 watch.forgive()
+        self._calibrating = calibration.state in ("waiting", "running")
 
     def take(self, skeleton: Skeleton) -> None:
         """Take the arm's next skeleton."""

@@ -54,9 +54,8 @@ class ArmSender:
     def tick(self, port: Port) -> None:
         """Take what came and send the arm's next frames."""
         now_ns = time.monotonic_ns()
-        for payload in self._decoded(self._calibrations.drain(), Calibration):
-            if payload.state == "done":
-                self._output.calibrated(payload.time_ns)
+        for calibration in self._decoded(self._calibrations.drain(), Calibration):
+            self._output.hear(calibration)
         for skeleton in self._decoded(self._skeletons.drain(), Skeleton):
             self._output.take(skeleton)
             self._arrived_ns = now_ns
