@@ -17,6 +17,7 @@ COMMANDS: dict[str, str] = {
     "calibrate": "calibrate a person's sensors in a running network: it says what to do",
     "wear-check": "which sensor sits where, and whether it is turned: it says what to change",
     "view": "the live view",
+    "web": "the therapist's and the patient's page, for tablets and browsers",
     "record": "the recorder",
     "lsl": "the room as Lab Streaming Layer streams, markers back as events; taps that a camera sees",
     "monitor": "the network in the terminal: nodes, rates, loss, latency",

@@ -1,0 +1,98 @@
+"""A server of the pages in a thread, beside a router; and a screen that talks to it."""
+
+import asyncio
+import json
+import threading
+from collections.abc import Awaitable, Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
+
+import aiohttp
+import pytest
+
+from brachium_viewer.web import server
+
+START_S = 40.0
+
+
+class Serving:
+    """A server in a thread: its address, its pairing codes, and its end."""
+
+    def __init__(self, **settings: object) -> None:
+        self.stop, self._ready = threading.Event(), threading.Event()
+        self.codes: list[str] = []
+        self.address, self.error = "", None
+        self.settings = server.WebSettings(
+            port=0, on_ready=self._opened, on_code=self.codes.append, **settings
+        )
+        self.thread = threading.Thread(target=self._run)
+        self.thread.start()
+        assert self._ready.wait(START_S)
+        if self.error is not None:
+            raise self.error
+
+    def _opened(self, address: str) -> None:
+        self.address = address.rstrip("/")
+        self._ready.set()
+
+    def _run(self) -> None:
+        try:
+            server.run(self.settings, self.stop)
+        except Exception as error:
+            self.error = error
+        finally:
+            self._ready.set()
+
+
+@contextmanager
+def _serving(**settings: object) -> Iterator[Serving]:
+    one = Serving(**settings)
+    try:
+        yield one
+    finally:
+        one.stop.set()
+        one.thread.join(10.0)
+        assert not one.thread.is_alive()
+
+
+@pytest.fixture
+def serve_pages() -> Callable[..., AbstractContextManager[Serving]]:
+    """The server as a context manager."""
+    return _serving
+
+
+class Screen:
+    """One WebSocket: what it hears by kind, and what it asks."""
+
+    def __init__(self, socket: aiohttp.ClientWebSocketResponse) -> None:
+        self.socket = socket
+        self.number = 0
+
+    async def until(self, found: Callable[[dict], bool], timeout_s: float = 20.0) -> dict:
+        """Return the first message that fits."""
+        async with asyncio.timeout(timeout_s):
+            while True:
+                message = json.loads((await self.socket.receive()).data)
+                if found(message):
+                    return message
+
+    async def ask(self, verb: str, **words: object) -> dict:
+        self.number += 1
+        await self.socket.send_json({"kind": "do", "id": self.number, "verb": verb, **words})
+        return await self.until(lambda m: m["kind"] == "answer" and m["id"] == self.number)
+
+
+@pytest.fixture
+def watch() -> Callable[..., None]:
+    """Run what a screen at an address does."""
+
+    def run(address: str, does: Callable[[Screen], Awaitable[None]], **headers: str) -> None:
+        async def screen() -> None:
+            async with (
+                aiohttp.ClientSession() as session,
+                session.ws_connect(f"{address}/ws", headers={"Origin": address, **headers}) as socket,
+            ):
+                await does(Screen(socket))
+
+        asyncio.run(screen())
+
+    return run

@@ -1,0 +1,182 @@
+"""What a page asks for, done: commands on the bus, marks into the recording, sets begun and ended."""
+
+import asyncio
+import logging
+from typing import Any
+
+from brachium_viewer import marks
+from brachium_viewer.web import requests as r
+from brachium_viewer.web.page_state import PageState
+from brachium_viewer.web.session_desk import SessionDesk
+from brachium_wire import keys
+from brachium_wire.bus import Bus
+from brachium_wire.codec import WireError, decode, encode
+from brachium_wire.hosttime import HostClock
+from brachium_wire.messages import Answer, Command, Session
+
+log = logging.getLogger(__name__)
+
+Json = dict[str, Any]
+
+LONGEST_S = 300.0
+"""No calibration takes longer; fusion itself gives up earlier."""
+HEARD_S = 1.0
+
+
+class Refused(ValueError):
+    """What cannot be done now: one line that says why and what to do."""
+
+
+class Desk:
+    """Does what pages ask, one thing a call; every failure is one line to the page that asked."""
+
+    def __init__(self, bus: Bus, state: PageState, sessions: SessionDesk, clock: HostClock) -> None:
+        self._bus, self._state, self._sessions, self._clock = bus, state, sessions, clock
+        self._calibrating = False
+
+    async def do(self, text: str) -> Json:
+        """Return the answer to one message of a page."""
+        verb, number = "", 0
+        try:
+            asked = r.read(text)
+            verb, number = str(asked.__struct_config__.tag), asked.id
+            data = await self._do(asked)
+        except (r.BadRequest, Refused, marks.BadMark, keys.BadKey, ValueError) as error:
+            return {"kind": "answer", "id": number, "verb": verb, "ok": False, "reason": str(error)}
+        except Exception as error:
+            log.exception("doing %s", verb)
+            return {
+                "kind": "answer",
+                "id": number,
+                "verb": verb,
+                "ok": False,
+                "reason": f"failed inside: {' '.join(str(error).split())[:200]}; see the server's log",
+            }
+        return {"kind": "answer", "id": number, "verb": verb, "ok": True, "data": data}
+
+    async def _do(self, asked: r.Any) -> Json:
+        if isinstance(asked, r.Subject):
+            return self._subject(asked)
+        subject = self._state.subject
+        if subject is None:
+            raise Refused("nobody is chosen: choose a subject first")
+        match asked:
+            case r.Calibrate():
+                arguments = {"routine": asked.routine, "pose": asked.pose, "seconds": asked.seconds}
+                return await self._calibrate(subject, "calibrate", arguments)
+            case r.Zero():
+                return await self._calibrate(subject, "zero", {})
+            case r.WearCheck():
+                return await self._wear_check(subject)
+            case r.Exercise():
+                return await self._begin(subject, asked)
+            case r.Stop():
+                return await self._end(subject, "stopped")
+            case r.PatientStop():
+                await self._mark(subject, marks.PatientStop(reason=asked.reason))
+                return await self._end(subject, "patient-stop", none_is_fine=True)
+            case r.Report():
+                return await self._finish(subject)
+            case r.Mark():
+                return await self._mark(subject, marks.Note(), asked.text)
+            case r.Donning():
+                return await self._mark(subject, marks.Donning())
+            case r.Pain():
+                return await self._mark(subject, marks.Pain(value=asked.value, when=asked.when))
+            case r.Effort():
+                return await self._mark(subject, marks.Effort(value=asked.value, when=asked.when))
+
+    def _subject(self, asked: r.Subject) -> Json:
+        if asked.create and self._state.known(asked.subject):
+            raise Refused(f"{asked.subject} is there already: choose it")
+        if not asked.create and not self._state.known(asked.subject):
+            raise Refused(f"{asked.subject} is not known here: create it first")
+        if self._sessions.subject not in (None, asked.subject):
+            raise Refused(f"a session of {self._sessions.subject} is recorded: end it first")
+        self._state.choose(asked.subject)
+        if asked.create:
+            told = Session(side=asked.side, height_m=asked.height_m)
+            self._bus.retain(keys.session(self._state.room, asked.subject), encode(told))
+        return {"subject": asked.subject}
+
+    async def _calibrate(self, subject: str, verb: str, arguments: Json) -> Json:
+        if self._calibrating:
+            raise Refused("a calibration is running: wait until it is over")
+        self._calibrating = True
+        try:
+            answer = await self._ask(subject, verb, arguments, LONGEST_S)
+        finally:
+            self._calibrating = False
+        if answer is None:
+            raise Refused("fusion does not answer; is brachium fuse running in this room?")
+        if not answer.ok:
+            raise Refused(answer.reason)
+        return answer.data
+
+    async def _wear_check(self, subject: str) -> Json:
+        answer = await self._ask(subject, "wear-check", {}, LONGEST_S)
+        if answer is None:
+            raise Refused(f"in a terminal: brachium wear-check --subject {subject}")
+        if not answer.ok:
+            raise Refused(answer.reason)
+        return answer.data
+
+    async def _begin(self, subject: str, asked: r.Exercise) -> Json:
+        if asked.side not in self._state.sides():
+            raise Refused(f"no skeletons of the {asked.side} arm come: are its sensors on?")
+        if self._state.running is not None:
+            raise Refused("a set is running: stop it first")
+        begins = marks.ExerciseBegins(
+            exercise=asked.exercise,
+            side=asked.side,
+            mode=asked.mode,
+            goal_deg=asked.goal_deg,
+            limit_deg=asked.limit_deg,
+            set=asked.set,
+            sets=asked.sets,
+            repetitions=asked.repetitions,
+        )
+        await self._sessions.begin(self._bus, subject)
+        now_ns = self._instant_ns()
+        self._state.begin(begins, now_ns)
+        self._put(subject, begins, now_ns)
+        return {}
+
+    async def _end(self, subject: str, reason: marks.Ended, *, none_is_fine: bool = False) -> Json:
+        running = self._state.running
+        if running is None:
+            if none_is_fine:
+                return {}
+            raise Refused("no set is running")
+        done = running.progress().done and reason == "stopped"
+        self._put(subject, marks.ExerciseEnds(reason="done" if done else reason), self._instant_ns())
+        ended = self._state.end()
+        return {"set": ended}
+
+    async def _finish(self, subject: str) -> Json:
+        if self._state.running is not None:
+            await self._end(subject, "stopped")
+        await asyncio.sleep(HEARD_S)  # what was said last is still on its way to the recording
+        return await self._sessions.finish(subject, self._state.session(subject), self._state.origin())
+
+    async def _mark(self, subject: str, mark: marks.Mark, text: str = "") -> Json:
+        await self._sessions.begin(self._bus, subject)
+        self._put(subject, mark, self._instant_ns(), text)
+        return {}
+
+    def _put(self, subject: str, mark: marks.Mark, now_ns: int, text: str = "") -> None:
+        self._bus.put(keys.event(self._state.room, subject), encode(marks.event(mark, now_ns, text)))
+
+    def _instant_ns(self) -> int:
+        return self._state.instant_ns(self._clock.now_ns())
+
+    async def _ask(self, subject: str, verb: str, arguments: Json, timeout_s: float) -> Answer | None:
+        key = keys.command(self._state.room, subject, verb)
+        question = encode(Command(arguments=arguments))
+        reply = await asyncio.to_thread(self._bus.ask, key, question, timeout_s)
+        if reply is None:
+            return None
+        try:
+            return decode(reply, Answer)
+        except WireError as error:
+            raise Refused(f"the answer cannot be read: {error}") from None

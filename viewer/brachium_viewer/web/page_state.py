@@ -1,0 +1,187 @@
+"""What the pages show: bus messages and their times in; frames and state out. Pure: no socket, no clock.
+
+One subject is shown at a time, the same on every screen: the therapist's and the patient's page agree.
+"""
+
+from dataclasses import dataclass, field
+
+from brachium_viewer.health import Network
+from brachium_viewer.marks import ExerciseBegins
+from brachium_viewer.web import frames
+from brachium_viewer.web.frames import Json
+from brachium_viewer.web.running_set import RunningSet
+from brachium_viewer.window import limit_s
+from brachium_wire import keys
+from brachium_wire.codec import WireError, decode_topic
+from brachium_wire.messages import Calibration, Info, Origin, Session, Skeleton
+
+MISSING_NS = round(limit_s("skeleton") * 1e9)
+"""An arm whose newest skeleton came longer ago is shown grey and without numbers."""
+GONE_NS = 60_000_000_000
+"""An arm that was silent for so long is shown no more."""
+PROGRESS_NS = 100_000_000
+"""The count is told so often; angles are told with every frame."""
+
+
+@dataclass(slots=True)
+class _Arm:
+    skeleton: Skeleton
+    heard_ns: int
+
+
+@dataclass(slots=True)
+class _Subject:
+    arms: dict[str, _Arm] = field(default_factory=dict)
+    calibration: Calibration | None = None
+    session: Session | None = None
+    origins: dict[str, Origin] = field(default_factory=dict)
+    """By segment."""
+
+
+class PageState:
+    """All that is known of the room, and what is chosen and running."""
+
+    def __init__(self, room: str, subject: str | None = None) -> None:
+        self.room, self.subject = room, subject
+        self.network = Network()
+        self.running: RunningSet | None = None
+        self._subjects: dict[str, _Subject] = {}
+        self._drawn: dict[str, tuple[int, bool]] = {}
+        self._progress: tuple[int, Json] | None = None
+
+    def feed(self, key: str, payload: bytes, now_ns: int) -> None:
+        """Take one message of the bus; what cannot be read is counted by `network.drops`."""
+        try:
+            where = keys.parse(key)
+        except keys.BadKey:
+            where = None
+        if where is None or where.topic not in ("skeleton", "calibration", "session"):
+            self.network.feed(key, payload, now_ns)
+            if where is not None and where.topic == "info":
+                self._info(where, payload)
+            return
+        try:
+            message = decode_topic(payload, where.topic)
+        except WireError as error:
+            drops = self.network.drops
+            drops[error.drop.value] = drops.get(error.drop.value, 0) + 1
+            return
+        subject = self._of(where.subject)
+        if isinstance(message, Skeleton):
+            subject.arms[where.detail] = _Arm(message, now_ns)
+            if self.running is not None and where.subject == self.subject:
+                self.running.feed(message)
+        elif isinstance(message, Calibration):
+            subject.calibration = message
+        elif isinstance(message, Session):
+            subject.session = message
+
+    def choose(self, subject: str) -> None:
+        """Show this subject. Raises BadKey for a name that cannot be one, ValueError while a set runs."""
+        keys.subject_chunk(subject)
+        if self.running is not None and subject != self.subject:
+            raise ValueError(f"a set of {self.subject} is running: stop it first")
+        self.subject, self._drawn = subject, {}
+
+    def begin(self, begins: ExerciseBegins, from_ns: int) -> None:
+        """Count a set from now on. Raises ValueError when one runs or nobody is chosen."""
+        if self.subject is None:
+            raise ValueError("no subject is chosen")
+        if self.running is not None:
+            raise ValueError("a set is running: stop it first")
+        self.running, self._progress = RunningSet(begins, from_ns), None
+
+    def end(self) -> Json | None:
+        """Count no more; return where the set stood, or None when none ran."""
+        ended, self.running = self.running, None
+        return None if ended is None else frames.progress(ended.progress())
+
+    def known(self, subject: str) -> bool:
+        """Return whether anything was heard of a subject."""
+        return subject in self._subjects
+
+    def session(self, subject: str) -> Session | None:
+        """Return what is known of a subject's body."""
+        return self._subjects[subject].session if subject in self._subjects else None
+
+    def instant_ns(self, now_ns: int) -> int:
+        """Return the instant of the newest skeleton shown, or `now_ns` when there is none: a mark's time."""
+        live = [a.skeleton.time_ns for a in self._arms().values() if now_ns - a.heard_ns < MISSING_NS]
+        return max(live, default=now_ns)
+
+    def sides(self) -> list[str]:
+        """Return the arms of the subject shown that skeletons come of."""
+        return sorted(self._arms(), reverse=True)
+
+    def origin(self) -> Origin:
+        """Return where the data of the subject shown come from; anything not worn outweighs what is."""
+        subject = self._subjects.get(self.subject or "", _Subject())
+        found = {a.skeleton.origin for a in subject.arms.values()} | set(subject.origins.values())
+        others: list[Origin] = [origin for origin in ("emulated", "playback") if origin in found]
+        return others[0] if others else "worn"
+
+    def frame(self, now_ns: int) -> Json | None:
+        """Return the newest of every arm, or None when nothing is new since the last call."""
+        drawn = {
+            side: (arm.skeleton.time_ns, now_ns - arm.heard_ns > MISSING_NS)
+            for side, arm in self._arms().items()
+            if now_ns - arm.heard_ns < GONE_NS
+        }
+        if drawn == self._drawn:
+            return None
+        self._drawn = drawn
+        arms = {
+            side: frames.arm(self._arms()[side].skeleton, stale=stale) for side, (_, stale) in drawn.items()
+        }
+        return {"kind": "frame", "subject": self.subject, "arms": arms, "set": self._counted(now_ns)}
+
+    def state(self, now_ns: int) -> Json:
+        """Return everything that changes seldom."""
+        report = self.network.report(now_ns)
+        shown = [n for n in report.nodes if n.subject == self.subject]
+        subject = self._subjects.get(self.subject or "", _Subject())
+        running = self.running
+        return {
+            "kind": "state",
+            "subjects": self._choices(),
+            "subject": self.subject,
+            "origin": self.origin(),
+            "live": sum(n.state == "live" for n in shown),
+            "sensors": [frames.sensor(n) for n in shown],
+            "waiting": report.waiting,
+            "services": {s.kind: s.up for s in sorted(report.services, key=lambda s: s.up)},
+            "sides": self.sides(),
+            "calibration": frames.calibration(subject.calibration),
+            "session": frames.session(subject.session),
+            "set": None if running is None else frames.running(running.begins, running.from_ns),
+        }
+
+    def _counted(self, now_ns: int) -> Json | None:
+        if self.running is None:
+            return None
+        if self._progress is None or now_ns - self._progress[0] >= PROGRESS_NS:
+            self._progress = now_ns, frames.progress(self.running.progress())
+        return self._progress[1]
+
+    def _choices(self) -> list[Json]:
+        return [
+            {"name": name, "sides": sorted(one.arms, reverse=True), "sensors": len(one.origins)}
+            for name, one in sorted(self._subjects.items())
+        ]
+
+    def _arms(self) -> dict[str, _Arm]:
+        return self._subjects[self.subject].arms if self.subject in self._subjects else {}
+
+    def _info(self, where: keys.Key, payload: bytes) -> None:
+        try:
+            message = decode_topic(payload, "info")
+        except WireError:
+            return  # counted by the network's health
+        if isinstance(message, Info):
+            self._of(where.subject).origins[where.detail] = message.origin
+
+    def _of(self, name: str) -> _Subject:
+        """Return a subject's record; the first that is heard of is shown."""
+        if self.subject is None and not name.endswith(keys.REFERENCE):
+            self.subject = name
+        return self._subjects.setdefault(name, _Subject())

@@ -1,0 +1,59 @@
+// The line to the server: a WebSocket that comes back by itself. docs/web-protocol.md says what travels.
+
+const FIRST_PAUSE_MS = 300;
+const LONGEST_PAUSE_MS = 5000;
+const ANSWER_MS = 320000;
+
+export class Link {
+  /** `heard` has a function for each kind of message: hello, frame, state; and `line(up)` for the line itself. */
+  constructor(heard) {
+    this.heard = heard;
+    this.waiting = new Map();
+    this.number = 0;
+    this.pause = FIRST_PAUSE_MS;
+    this.open();
+  }
+
+  open() {
+    const scheme = location.protocol === "https:" ? "wss" : "ws";
+    this.socket = new WebSocket(`${scheme}://${location.host}/ws`);
+    this.socket.onopen = () => {
+      this.pause = FIRST_PAUSE_MS;
+      this.heard.line?.(true);
+    };
+    this.socket.onmessage = (event) => this.take(JSON.parse(event.data));
+    this.socket.onclose = () => this.lost();
+  }
+
+  take(message) {
+    if (message.kind === "answer") {
+      this.waiting.get(message.id)?.(message);
+      this.waiting.delete(message.id);
+    } else {
+      this.heard[message.kind]?.(message);
+    }
+  }
+
+  async lost() {
+    this.heard.line?.(false);
+    for (const answer of this.waiting.values()) answer({ ok: false, reason: "" });
+    this.waiting.clear();
+    await new Promise((done) => setTimeout(done, this.pause));
+    this.pause = Math.min(LONGEST_PAUSE_MS, 2 * this.pause);
+    // A key that has run out is told by no WebSocket: ask for something small, and go to the door if it is refused.
+    const asked = await fetch("/app/link.js", { method: "HEAD", cache: "no-store" }).catch(() => null);
+    if (asked?.status === 401) location.assign(`/door?to=${location.pathname}`);
+    else this.open();
+  }
+
+  /** Ask for something; the promise gives {ok, reason, data}, and never fails. */
+  ask(verb, words = {}) {
+    if (this.socket.readyState !== WebSocket.OPEN) return Promise.resolve({ ok: false, reason: "" });
+    const id = ++this.number;
+    return new Promise((done) => {
+      this.waiting.set(id, done);
+      setTimeout(() => this.take({ kind: "answer", id, ok: false, reason: "" }), ANSWER_MS);
+      this.socket.send(JSON.stringify({ kind: "do", id, verb, ...words }));
+    });
+  }
+}

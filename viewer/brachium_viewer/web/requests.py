@@ -1,0 +1,127 @@
+"""What a page may ask for: one record a verb, checked here once. Pure."""
+
+from typing import Annotated, Literal
+
+import msgspec
+
+from brachium_body.segments import Side
+from brachium_viewer.marks import Mode, When
+
+MAX_BYTES = 4096
+"""A request is a few words."""
+
+Rating = Annotated[int, msgspec.Meta(ge=0, le=10)]
+Degrees = Annotated[float, msgspec.Meta(ge=-360.0, le=360.0)]
+Count = Annotated[int, msgspec.Meta(ge=1, le=100)]
+Words = Annotated[str, msgspec.Meta(max_length=500)]
+
+
+class BadRequest(ValueError):
+    """What cannot be asked: one line that says what was expected."""
+
+
+class Request(msgspec.Struct, frozen=True, kw_only=True, tag_field="verb"):
+    """Base of all; `id` comes back with the answer."""
+
+    id: int = 0
+
+
+class Calibrate(Request, frozen=True, kw_only=True, tag="calibrate"):
+    """Find how the sensors are worn."""
+
+    routine: Literal["pose", "guided", "free"] = "pose"
+    pose: Literal["n-pose", "table"] = "n-pose"
+    seconds: Annotated[float, msgspec.Meta(ge=1.0, le=30.0)] = 3.0
+
+
+class Zero(Request, frozen=True, kw_only=True, tag="zero"):
+    """Set headings anew while the arms hang still."""
+
+
+class WearCheck(Request, frozen=True, kw_only=True, tag="wear-check"):
+    """Find which sensor sits where."""
+
+
+class Exercise(Request, frozen=True, kw_only=True, tag="exercise"):
+    """Begin a set."""
+
+    exercise: Annotated[str, msgspec.Meta(min_length=1, max_length=64)]
+    side: Side
+    mode: Mode = "active"
+    goal_deg: Degrees | None = None
+    limit_deg: Degrees | None = None
+    set: Count = 1
+    sets: Count = 1
+    repetitions: Count | None = None
+
+
+class Stop(Request, frozen=True, kw_only=True, tag="stop"):
+    """End the set that runs."""
+
+
+class PatientStop(Request, frozen=True, kw_only=True, tag="patient-stop"):
+    """End the set because the patient wants to."""
+
+    reason: Literal["pain", "tired", "dizzy", "other"] = "other"
+
+
+class Mark(Request, frozen=True, kw_only=True, tag="mark"):
+    """Mark this instant."""
+
+    text: Words = ""
+
+
+class Donning(Request, frozen=True, kw_only=True, tag="donning"):
+    """The sensors were put on anew."""
+
+
+class Pain(Request, frozen=True, kw_only=True, tag="pain"):
+    """Pain as the patient rates it."""
+
+    value: Rating
+    when: When
+
+
+class Effort(Request, frozen=True, kw_only=True, tag="effort"):
+    """Effort as the patient rates it."""
+
+    value: Rating
+    when: When
+
+
+class Subject(Request, frozen=True, kw_only=True, tag="subject"):
+    """Show a subject; with `create` one that is new."""
+
+    subject: Annotated[str, msgspec.Meta(min_length=1, max_length=64)]
+    create: bool = False
+    side: Literal["right", "left", "both"] = "right"
+    height_m: Annotated[float, msgspec.Meta(ge=0.5, le=2.5)] | None = None
+
+
+class Report(Request, frozen=True, kw_only=True, tag="report"):
+    """End the session: close its recording and make its report."""
+
+
+Any = (
+    Calibrate
+    | Zero
+    | WearCheck
+    | Exercise
+    | Stop
+    | PatientStop
+    | Mark
+    | Donning
+    | Pain
+    | Effort
+    | Subject
+    | Report
+)
+_decoder: msgspec.json.Decoder[Any] = msgspec.json.Decoder(Any)
+
+
+def read(text: str) -> Any:
+    """Return the request in a page's message. Raises BadRequest."""
+    try:
+        return _decoder.decode(text)
+    except (msgspec.DecodeError, UnicodeEncodeError) as error:
+        raise BadRequest(f"this cannot be asked: {error}") from None

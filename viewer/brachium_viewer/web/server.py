@@ -1,0 +1,197 @@
+"""The server of the pages: the bus on one side, browsers on the other."""
+
+import asyncio
+import json
+import logging
+import os
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from aiohttp import web
+
+from brachium_viewer.web import frames
+from brachium_viewer.web.desk import Desk
+from brachium_viewer.web.door import Door, is_loopback
+from brachium_viewer.web.page_state import PageState
+from brachium_viewer.web.rooms import Rooms
+from brachium_viewer.web.seats import Seat
+from brachium_viewer.web.session_desk import SessionDesk
+from brachium_wire import keys
+from brachium_wire.bus import DEFAULT_ENDPOINT, Bus, Inbox
+from brachium_wire.heart import Heart
+from brachium_wire.hosttime import HostClock
+
+log = logging.getLogger(__name__)
+
+RATE_HZ = 30.0
+"""Frames a second to each screen."""
+STATE_S = 0.2
+"""Between two states; one that says nothing new is not sent."""
+END_S = 1.0
+_TAILS = ("skeleton/*", "imu/*", "imu/*/info", "imu/*/status", "calibration", "session")
+_RETAINED = ("imu/*/info", "calibration", "session")
+
+
+class WebError(RuntimeError):
+    """The server cannot start; the text says what to do."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class WebSettings:
+    """Where the pages are served, and to whom."""
+
+    endpoint: str = DEFAULT_ENDPOINT
+    room: str = keys.DEFAULT_ROOM
+    bind: str = "127.0.0.1"
+    """One address; only programs of this machine reach a loopback one."""
+    port: int = 8080
+    """0 takes any free one."""
+    subject: str | None = None
+    """Who is shown first; None: the first that is heard of."""
+    sessions: Path = Path("sessions")
+    """Folder of recordings and results."""
+    password: str | None = None
+    """What every screen must say once; None: pairing codes."""
+    open_door: bool = False
+    """Nobody is asked for anything; on loopback only."""
+    on_ready: Callable[[str], None] | None = None
+    """Called with the address of the pages once they can be opened."""
+    on_code: Callable[[str], None] | None = None
+    """Called with each new pairing code."""
+
+
+def run(settings: WebSettings, stop: threading.Event) -> None:
+    """Serve the pages until `stop` is set.
+
+    Raises WebError when the port is taken or the door would stand open to others, NoRouter without a router.
+    """
+    if settings.open_door and not is_loopback(settings.bind):
+        raise WebError(
+            f"without a password the pages are for this machine only; {settings.bind} is reached by others: "
+            "leave --no-password out"
+        )
+    with Bus.open(settings.endpoint, stop=stop) as bus:
+        asyncio.run(_Server(settings, bus).serve(stop))
+
+
+class _Server:
+    """One run of the server; everything here happens on one event loop."""
+
+    def __init__(self, settings: WebSettings, bus: Bus) -> None:
+        self._settings, self._bus = settings, bus
+        self._clock = HostClock()
+        self._id = f"web-{os.getpid()}"
+        self._state = PageState(settings.room, settings.subject)
+        self._sessions = SessionDesk(settings.sessions, settings.endpoint, settings.room, self._id)
+        self._desk = Desk(bus, self._state, self._sessions, self._clock)
+        self._seats: set[Seat] = set()
+        self._state_text = ""
+        self._state_due = 0.0
+        self._tokens: list[tuple[str, bool]] = []
+        door = None if settings.open_door else Door(settings.password, settings.on_code)
+        self._rooms = Rooms(
+            bind=settings.bind,
+            door=door,
+            greet=self._greet,
+            leave=self._seats.discard,
+            asked=self._asked,
+            report=self._sessions.report_file,
+        )
+
+    async def serve(self, stop: threading.Event) -> None:
+        """Serve until `stop` is set."""
+        inboxes = self._listen()
+        heart = Heart(self._bus, self._settings.room, "web", self._id)
+        runner, address = await self._open()
+        heart.text = address
+        try:
+            due = time.monotonic()
+            while not stop.is_set():
+                self._take(inboxes)
+                self._tell()
+                heart.counts["screens"] = len(self._seats)
+                heart.drops["overflow"] = sum(inbox.dropped for inbox in inboxes)
+                heart.beat()
+                due = max(due + 1.0 / RATE_HZ, time.monotonic())
+                await asyncio.sleep(due - time.monotonic())
+        finally:
+            await runner.cleanup()
+            await asyncio.to_thread(self._sessions.close)
+
+    def _listen(self) -> list[Inbox]:
+        room = self._settings.room
+        self._bus.watch_alive(
+            keys.services(room, "*/*/alive"), lambda key, up: self._tokens.append((key, up))
+        )
+        inboxes = [self._bus.subscribe(keys.subjects(room, tail), 4096) for tail in _TAILS]
+        inboxes.append(self._bus.subscribe(keys.services(room), 4096))
+        now_ns = self._clock.now_ns()
+        for tail in _RETAINED:
+            for key, payload in self._bus.fetch(keys.subjects(room, tail)):
+                self._state.feed(key, payload, now_ns)
+        return inboxes
+
+    async def _open(self) -> tuple[web.AppRunner, str]:
+        settings = self._settings
+        runner = web.AppRunner(self._rooms.application(), access_log=None, shutdown_timeout=END_S)
+        await runner.setup()
+        try:
+            await web.TCPSite(runner, settings.bind, settings.port).start()
+        except OSError as error:
+            await runner.cleanup()
+            raise WebError(
+                f"the pages cannot be served at {settings.bind} port {settings.port} "
+                f"({error.strerror or error}): choose another with --port or --bind"
+            ) from None
+        port = int(runner.addresses[0][1])
+        self._rooms.opened(port)
+        host = f"[{settings.bind}]" if ":" in settings.bind else settings.bind
+        address = f"http://{host}:{port}/"
+        log.info("pages at %s", address)
+        if settings.on_ready is not None:
+            settings.on_ready(address)
+        return runner, address
+
+    def _take(self, inboxes: list[Inbox]) -> None:
+        now_ns = self._clock.now_ns()
+        for inbox in inboxes:
+            for key, payload in inbox.drain():
+                self._state.feed(key, payload, now_ns)
+        while self._tokens:
+            self._state.network.token(*self._tokens.pop(0))
+
+    def _tell(self) -> None:
+        """Give every screen what is new: the frame now, the state at most five times a second."""
+        now_ns = self._clock.now_ns()
+        frame = self._state.frame(now_ns) if self._seats else None
+        if frame is not None:
+            text = _text({**frame, "sent": now_ns / 1e6})
+            for seat in self._seats:
+                seat.put_frame(text)
+        if time.monotonic() >= self._state_due:
+            self._state_due = time.monotonic() + STATE_S
+            text = self._state_now(now_ns)
+            if text != self._state_text:
+                self._state_text = text
+                for seat in self._seats:
+                    seat.put_state(text)
+
+    def _state_now(self, now_ns: int) -> str:
+        return _text({**self._state.state(now_ns), **self._sessions.state(self._state.subject)})
+
+    def _greet(self) -> Seat:
+        seat = Seat()
+        seat.put_answer(_text(frames.hello(self._settings.room)))
+        seat.put_state(self._state_text or self._state_now(self._clock.now_ns()))
+        self._seats.add(seat)
+        return seat
+
+    async def _asked(self, seat: Seat, text: str) -> None:
+        seat.put_answer(_text(await self._desk.do(text)))
+
+
+def _text(message: object) -> str:
+    return json.dumps(message, separators=(",", ":"), allow_nan=False, default=str)
