@@ -51,6 +51,9 @@ class PersonSettings:
     """What is done before the exercise: a routine of routines.ROUTINES, or nothing."""
     extent: float = 1.0
     """How far the exercise goes from neutral: 1 as it is described, 0 stands still."""
+    movement_seed: int | None = None
+    """Of the exercise's movement, so that persons of other seeds, who differ in all else, make the very same
+    one; None: of `seed`."""
     sway_deg: float = 0.0
     """Standard deviation of each of the trunk's three rotations while exercising; 0 is a back held still."""
 
@@ -129,7 +132,8 @@ class Person:
         s, build = self.settings, self.build(side)
         motion = EXERCISES[s.exercise].motion
         exercising = eased(t - self.begins_s - TRANSITION_S, rise_s=1.0)
-        moving = motion(exercising, Variation(s.seed, side), build)
+        own = s.seed if s.movement_seed is None else s.movement_seed
+        moving = motion(exercising, Variation(own, side), build)
         active = s.arms in (side, "both")
         share = self._begun(t) if active else np.zeros(len(t))
         made, before = moving.scaled(s.extent * share), share < 1.0

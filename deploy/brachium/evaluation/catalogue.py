@@ -7,6 +7,7 @@ from brachium.evaluation import (
     alignment_tables,
     arm_tables,
     detection,
+    donning_tables,
     long_run,
     recording_tables,
     repetition_tables,
@@ -64,6 +65,8 @@ CATALOGUE: tuple[Entry, ...] = (
     Entry(name="detection", shows="the smallest movement that is seen", make=detection.detection),
     Entry(name="repetitions", shows="200 sessions: repetitions counted, ranges of motion",
           make=repetition_tables.repetitions),
+    Entry(name="donnings", shows="the same movement, sensors put on anew: what is called a change",
+          make=donning_tables.donnings),
     Entry(name="sensor-sets", shows="one, two and three sensors, right and left",
           make=sensor_sets.sensor_sets),
 )  # fmt: skip

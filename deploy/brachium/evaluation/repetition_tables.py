@@ -156,14 +156,15 @@ def session(name: str, level: Level, seed: int) -> Session:
     measured = {n: v[rows] for n, v in found.angles.items()}
     return Session(
         done=plan.whole,
-        measured=_measures(time_s, measured, found.positions, rows, exercise),
-        true=_measures(time_s, truth, made.truth.trunk_positions, rows, exercise),
+        measured=arm_measures(time_s, measured, found.positions, rows, exercise),
+        true=arm_measures(time_s, truth, made.truth.trunk_positions, rows, exercise),
     )
 
 
-def _measures(
+def arm_measures(
     time_s: Floats, angles_rad: dict[str, Floats], places: dict[str, Floats], rows: slice, exercise: Exercise
 ) -> SetMeasures:
+    """Return the measures of a right arm's set: angles (n,) by column, places (m, 3) whose `rows` count."""
     quality: dict[str, npt.NDArray[np.str_]] = {
         **{n: _words(v) for n, v in angles_rad.items()},
         **{j: _words(places[j][rows][:, 0]) for j in JOINTS},

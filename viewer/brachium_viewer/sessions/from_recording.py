@@ -157,7 +157,7 @@ def origin(contents: Contents, subject: str) -> Origin:
             found |= {s.origin for s in arm.published}
     for word in ("emulated", "playback", "worn"):
         if word in found:
-            return word  # type: ignore[return-value]
+            return word
     raise StoreError(f"the recording does not say where the data of {subject} come from")
 
 

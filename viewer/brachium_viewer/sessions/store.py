@@ -145,7 +145,7 @@ class Store:
     def delete(self, subject: str) -> None:
         """Delete everything of a subject: rows, recordings, and what lies beside them.
 
-        Others who are in the same recording stay in it. Cut short, it is finished at the store's next opening.
+        Others who are in the same recording stay in it. Cut short, it is finished when the store is opened.
         Raises StoreError for a subject that is not known, and while one of its recordings is being written.
         """
         known = self.subject(subject) is not None or any(files.of_subject(self.folder, subject))
