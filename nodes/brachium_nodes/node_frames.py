@@ -188,7 +188,7 @@ def from_node(payload: bytes | str) -> NodeFrame:
     """Return the frame that a node sent, or raise WireError.
 
     Batches and clock answers come by thousands a second: one pass parses them and checks types. Their numbers
-    are checked where they are used. What that pass does not take is left to the other, which says what is wrong.
+    are checked where they are used. What that pass does not take is left to the other, which says why.
     """
     if isinstance(payload, bytes) and len(payload) <= MAX_FRAME_BYTES:
         try:
