@@ -18,15 +18,20 @@ POINTS = 900
 """Points of a line at most: more than its pixels are of no use in print."""
 
 
-def _figure(width_in: float, height_in: float) -> tuple[Any, Any]:
+def new_figure(width_in: float, height_in: float, *, constrained: bool = True) -> Any:
+    """Return an empty figure of this size. Raises MissingExtra without matplotlib."""
     try:
         from matplotlib.backends.backend_svg import FigureCanvasSVG
         from matplotlib.figure import Figure
     except ImportError:
-        raise MissingExtra("the summary page needs matplotlib: pip install 'brachium[report]'") from None
-    figure = Figure(figsize=(width_in, height_in), layout="constrained")
+        raise MissingExtra("a page's charts need matplotlib: pip install 'brachium[report]'") from None
+    figure = Figure(figsize=(width_in, height_in), layout="constrained" if constrained else None)
     FigureCanvasSVG(figure)
-    axes = figure.add_subplot()
+    return figure
+
+
+def plain(axes: Any) -> None:
+    """Give axes the look of every page."""
     for side in ("top", "right"):
         axes.spines[side].set_visible(False)
     for side in ("left", "bottom"):
@@ -34,10 +39,17 @@ def _figure(width_in: float, height_in: float) -> tuple[Any, Any]:
     axes.tick_params(colors=QUIET, labelsize=7.5, length=2.5, width=0.6)
     axes.grid(axis="y", color="#e6eaee", linewidth=0.6)
     axes.set_axisbelow(True)
+
+
+def _figure(width_in: float, height_in: float) -> tuple[Any, Any]:
+    figure = new_figure(width_in, height_in)
+    axes = figure.add_subplot()
+    plain(axes)
     return figure, axes
 
 
-def _svg(figure: Any, name: str) -> str:
+def svg(figure: Any, name: str) -> str:
+    """Return a figure as SVG text for a page: no size of its own, and ids that no other chart of it has."""
     import matplotlib
 
     out = io.StringIO()
@@ -52,7 +64,9 @@ def _svg(figure: Any, name: str) -> str:
     prefix = re.sub("[^a-z0-9]", "-", name.lower())
     text = re.sub(r'\bid="', f'id="{prefix}-', text)
     text = re.sub(r'href="#', f'href="#{prefix}-', text)
-    return re.sub(r"url\(#", f"url(#{prefix}-", text)
+    text = re.sub(r"url\(#", f"url(#{prefix}-", text)
+    # A hundredth of a point is finer than any printer.
+    return re.sub(r'(?<= d=")M [^"]*', lambda path: re.sub(r"(\.\d\d)\d+", r"\1", path.group()), text)
 
 
 def thinned(time: Floats, values: Floats) -> tuple[Floats, Floats]:
@@ -105,7 +119,7 @@ def line(
     elif high - low < 10.0:  # stillness is to look still
         low, high = (low + high) / 2 - 5.0, (low + high) / 2 + 5.0
     axes.set_ylim(low, high)
-    return _svg(figure, name)
+    return svg(figure, name)
 
 
 def _reach(
@@ -142,7 +156,7 @@ def histogram(name: str, values: Floats, unit: str, marks: Mapping[str, float]) 
     axes.set_xlim(0.0, end)
     axes.set_xlabel(unit, color=QUIET, fontsize=7.5, labelpad=1)
     axes.set_ylabel("skeletons", color=QUIET, fontsize=7.5)
-    return _svg(figure, name)
+    return svg(figure, name)
 
 
 def bars(name: str, values: Mapping[str, float], unit: str) -> str:
@@ -159,4 +173,4 @@ def bars(name: str, values: Mapping[str, float], unit: str) -> str:
     axes.set_xlim(0.0, max(reach * 1.2, 1.0))
     axes.set_ylim(-0.6, max(len(names), 2) - 0.4)
     axes.set_xlabel(unit, color=QUIET, fontsize=7.5, labelpad=1)
-    return _svg(figure, name)
+    return svg(figure, name)

@@ -7,16 +7,9 @@ from brachium_viewer import figures as f
 from brachium_viewer.contents import Contents
 from brachium_viewer.figures import SummaryFigures
 from brachium_viewer.page_sections import arm_section, network_charts, tables
-from brachium_wire.table import MissingExtra
+from brachium_viewer.page_template import origin_words, render
 
-_ORIGIN = {
-    "worn": ("Worn.", "A person wore these sensors."),
-    "emulated": ("Emulated.", "No person wore these sensors: every sample comes from a computed wearer."),
-    "playback": (
-        "Playback.",
-        "These samples were played from a file; nobody wore the sensors while this was recorded.",
-    ),
-}
+TEMPLATE = Path(__file__).with_name("summary.html.j2")
 
 
 def write(recording: Path, out: Path, title: str = "") -> SummaryFigures:
@@ -33,20 +26,11 @@ def write(recording: Path, out: Path, title: str = "") -> SummaryFigures:
 
 def page(contents: Contents, figures: SummaryFigures, title: str = "") -> str:
     """Return the page's HTML: no script, nothing loaded from elsewhere."""
-    try:
-        import jinja2
-    except ImportError:
-        raise MissingExtra("the summary page needs Jinja2: pip install 'brachium[report]'") from None
-    environment = jinja2.Environment(
-        autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True
-    )
-    template = environment.from_string(
-        Path(__file__).with_name("summary.html.j2").read_text(encoding="utf-8")
-    )
     subjects = sorted({who[0] for who in (*contents.sensors, *contents.arms)})
     heading = title or f"Summary of {', '.join(subjects) or figures.recording}"
-    origin_title, origin_text = _origin(figures.origins)
-    return template.render(
+    origin_title, origin_text = origin_words(figures.origins)
+    return render(
+        TEMPLATE,
         title=heading,
         heading=heading,
         facts=_facts(contents, figures),
@@ -64,14 +48,6 @@ def page(contents: Contents, figures: SummaryFigures, title: str = "") -> str:
         tables=tables(figures),
         recording=figures.recording,
     )
-
-
-def _origin(origins: list[str]) -> tuple[str, str]:
-    if not origins:
-        return "Origin unknown.", "The recording does not say where its data come from."
-    if len(origins) == 1:
-        return _ORIGIN[origins[0]]
-    return f"Mixed: {', '.join(origins)}.", "Not all of these data come from sensors that a person wore."
 
 
 def _facts(contents: Contents, figures: SummaryFigures) -> list[str]:

@@ -1,6 +1,7 @@
 """What is measured of a whole set of an exercise: counts, medians, change within the set. Pure."""
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -73,6 +74,27 @@ def set_measures(
     )
 
 
+def together(sets: Sequence[SetMeasures], exercise: Exercise) -> SetMeasures:
+    """Return several sets of one exercise by one arm in one mode as if they had been one.
+
+    Raises ValueError when there is none, or they are of different exercises, arms or modes.
+    """
+    if len({(one.exercise, one.side, one.mode) for one in sets}) != 1:
+        raise ValueError("sets of one exercise by one arm in one mode can be taken together")
+    found = tuple(repetition for one in sets for repetition in one.repetitions)
+    deficits = [one.extension_deficit for one in sets if one.extension_deficit.value is not None]
+    return replace(
+        sets[0],
+        to_s=sets[-1].to_s,
+        tries=sum(one.tries for one in sets),
+        repetitions=found,
+        medians={name: _median(found, name) for name in NAMES},
+        best_peak=_best(found, rises=exercise.rises),
+        first_to_last={name: _change(found, name) for name in NAMES},
+        extension_deficit=min(deficits, key=lambda one: one.value or 0.0, default=sets[0].extension_deficit),
+    )
+
+
 def values(found: tuple[RepetitionMeasures, ...], name: str) -> list[float]:
     """Return the values of one measure, of the repetitions that have it."""
     return [m.value for one in found if (m := one.measures[name]).value is not None]
@@ -116,4 +138,4 @@ def loss_between(active: SetMeasures, passive: SetMeasures) -> Measure:
     return measure(abs(passive.best_peak.value - active.best_peak.value), "deg")
 
 
-__all__ = ["FEW", "SetMeasures", "loss_between", "rising", "set_measures", "values"]
+__all__ = ["FEW", "SetMeasures", "loss_between", "rising", "set_measures", "together", "values"]
