@@ -75,6 +75,7 @@ class ServiceHealth:
     age_s: float | None = None
     drops: dict[str, int] = field(default_factory=dict)
     text: str = ""
+    alarm: str = ""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -238,12 +239,12 @@ class _Service:
 
     def report(self, kind: str, name: str, now_ns: int) -> ServiceHealth:
         age_s = None if self.heard_ns is None else max(0.0, (now_ns - self.heard_ns) / SECOND)
-        fresh = age_s is None or age_s <= limit_s("health")
         return ServiceHealth(
             kind=kind,
             id=name,
-            up=self.token and fresh,
+            up=self.token and (age_s is None or age_s <= limit_s("health")),
             age_s=age_s,
             drops=dict(self.health.drops) if self.health is not None else {},
             text=self.health.text if self.health is not None else "",
+            alarm=self.health.alarm if self.health is not None and self.token else "",
         )

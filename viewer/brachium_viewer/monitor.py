@@ -97,6 +97,9 @@ def block(health: NetworkHealth, *, colour: bool = False) -> str:
         for n in health.nodes
         if n.battery_hours is not None and is_low(n.battery_hours)
     ]
+    lines += [
+        _paint(f"ALARM: {s.kind}/{s.id}: {s.alarm}", "missing", colour) for s in health.services if s.alarm
+    ]
     if health.services:
         up = [f"{s.kind}/{s.id}" for s in health.services if s.up]
         down = [f"{s.kind}/{s.id}" for s in health.services if not s.up]

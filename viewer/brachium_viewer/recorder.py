@@ -1,21 +1,24 @@
-"""The recorder: everything a room says, on disk in order of arrival, beginning with fusion's state."""
+"""The recorder: everything a room says, on disk in order of arrival, beginning with fusion's state.
+
+When the disk takes no more it closes the file with all that came until then, raises an alarm in its health
+and counts what it lets go. It does not begin anew by itself, even when there is room again: one recording is
+one file with one beginning, and whoever makes room begins the next one.
+"""
 
 import logging
-import re
 import threading
 import time
 from collections import Counter
-from collections.abc import Iterable
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
 
+from brachium_viewer.recording_opening import opening
 from brachium_wire import keys, recording
 from brachium_wire.bus import DEFAULT_ENDPOINT, Bus, Inbox
-from brachium_wire.codec import Drop, WireError, decode, encode
+from brachium_wire.codec import Drop
 from brachium_wire.heart import Heart
 from brachium_wire.hosttime import HostClock
-from brachium_wire.messages import Answer, Command, Snapshot
 from brachium_wire.topics import TOPICS
 
 log = logging.getLogger(__name__)
@@ -49,6 +52,8 @@ class RecordReport:
     """Messages that came and were not recorded, by reason."""
     missing: dict[str, int] = field(default_factory=dict)
     """Messages a key that were written and are not in the closed file: none, or the disk is at fault."""
+    ended: str = ""
+    """Why the recording ended before it was told to; empty when it did not."""
 
 
 class Recorder:
@@ -59,6 +64,8 @@ class Recorder:
         self._subject = subject
         self.received: Counter[str] = Counter()
         self.drops: Counter[str] = Counter()
+        self.ended = ""
+        """Why the disk takes no more; empty while it does."""
 
     def take(self, key: str, payload: bytes, now_ns: int) -> None:
         """Record one message, or count why not."""
@@ -75,25 +82,57 @@ class Recorder:
         if len(payload) > row.max_bytes:
             self.drops[Drop.OVERSIZE.value] += 1
             return
-        self.writer.write(key, payload, now_ns)
+        if self.ended:
+            self.drops[Drop.DISK_FULL.value] += 1
+            return
         self.received[key] += 1
+        try:
+            self.writer.write(key, payload, now_ns)
+        except OSError as error:
+            self._end(error)
+
+    def tick(self, now_ns: int) -> None:
+        """Bring to the disk what is due."""
+        if not self.ended:
+            try:
+                self.writer.tick(now_ns)
+            except OSError as error:
+                self._end(error)
+
+    def _end(self, error: OSError) -> None:
+        """Close the file now, so that whatever happens next it is whole."""
+        path = self.writer.path
+        try:
+            self.writer.close()
+            kept = "what came until then"
+        except OSError:
+            kept = "what came until then but for its index and at most half a second"
+        self.ended = (
+            f"the disk takes no more ({error.strerror}); {path.name} holds {kept}. "
+            f"Make room in {path.parent}, then record anew"
+        )
+        log.error("%s", self.ended)
 
     def report(self) -> RecordReport:
         """Compare what was received with what the closed file holds."""
-        found = recording.counts(self.writer.path)
+        found = _found(self.writer.path)
         missing = {key: n - found.get(key, 0) for key, n in self.received.items() if n != found.get(key, 0)}
         topics: Counter[str] = Counter()
         for key, n in found.items():
             topics[keys.parse(key).topic] += n
         return RecordReport(
-            path=self.writer.path, messages=dict(topics), dropped=dict(self.drops), missing=missing
+            path=self.writer.path,
+            messages=dict(topics),
+            dropped=dict(self.drops),
+            missing=missing,
+            ended=self.ended,
         )
 
 
 def run(settings: RecordSettings, stop: threading.Event) -> RecordReport:
     """Record the room until `stop` is set or the time is over, and say what the file holds.
 
-    Raises BadKey before anything is touched, NoRouter, and OSError when the disk takes no more.
+    Raises BadKey before anything is touched, NoRouter, and OSError when the disk has no room to begin.
     """
     keys.service(settings.room, "recorder", settings.id)
     if settings.subject is not None:
@@ -129,7 +168,7 @@ def recover_folder(folder: Path) -> list[recording.RecoverReport]:
         except recording.BeingWritten as error:
             log.info("%s", error)
             continue
-        except recording.RecordingError as error:
+        except (recording.RecordingError, OSError) as error:
             log.warning("%s", error)
             continue
         log.warning("%s had not been closed: recovered %d messages", path, sum(report.messages.values()))
@@ -137,44 +176,12 @@ def recover_folder(folder: Path) -> list[recording.RecoverReport]:
     return reports
 
 
-def opening(bus: Bus, room: str, subject: str | None = None) -> list[tuple[str, bytes]]:
-    """Return what a recording begins with: fusion's snapshot of each subject, then all retained messages."""
-    retained = []
-    for row in TOPICS.values():
-        if row.retained and row.recorded:
-            tail = re.sub("<[a-z]+>", "*", row.pattern.removeprefix("<subject>/"))
-            retained += bus.fetch(keys.subjects(room, tail, subject or "*"))
-    found = _subjects(key for key, _ in retained)
-    return [one for who in found if (one := _snapshot(bus, room, who)) is not None] + retained
-
-
-def _subjects(names: Iterable[str]) -> list[str]:
-    found = set()
-    for key in names:
-        try:
-            found.add(keys.parse(key).subject)
-        except keys.BadKey:
-            continue
-    return sorted(found)
-
-
-def _snapshot(bus: Bus, room: str, subject: str) -> tuple[str, bytes] | None:
-    """Ask fusion for its state; None when nobody answers, or not with a snapshot."""
-    reply = bus.ask(keys.command(room, subject, "record"), encode(Command()))
-    if reply is None:
-        log.info("no fusion answered for %s: the recording begins without its state", subject)
-        return None
-    limit = TOPICS["snapshot"].max_bytes
-    try:
-        answer = decode(reply, Answer, limit + 1024)
-        payload = answer.data.get("snapshot")
-        if not answer.ok or not isinstance(payload, bytes):
-            raise WireError(Drop.MALFORMED, answer.reason or "the answer holds no snapshot")
-        decode(payload, Snapshot, limit)
-    except WireError as error:
-        log.warning("the recording begins without fusion's state of %s: %r", subject, str(error))
-        return None
-    return keys.snapshot(room, subject), payload
+def _found(path: Path) -> dict[str, int]:
+    """Return the messages a key of a file, closed or not."""
+    if recording.is_closed(path):
+        return recording.counts(path)
+    with recording.read(path) as messages:
+        return Counter(message.key for message in messages)
 
 
 def _create(settings: RecordSettings) -> recording.RecordingWriter:
@@ -211,9 +218,13 @@ def _record(
 def _drain(recorder: Recorder, inbox: Inbox, heart: Heart, clock: HostClock) -> None:
     for key, payload in inbox.drain():
         recorder.take(key, payload, clock.now_ns())
-    recorder.writer.tick(clock.now_ns())
+    recorder.tick(clock.now_ns())
     if inbox.dropped:
         recorder.drops[Drop.OVERFLOW.value] = inbox.dropped
+    if recorder.ended and not heart.alarm:
+        heart.alarm = recorder.ended
+        heart.beat(now=True)
     heart.counts["recorded"] = sum(recorder.received.values())
+    heart.counts["bytes_on_disk"] = recorder.writer.synced
     for name, n in recorder.drops.items():
         heart.drops[name] = n

@@ -7,7 +7,7 @@ from typing import TypeVar
 import msgpack
 import msgspec
 
-from brachium_wire.messages import Command, Message, SampleBatch
+from brachium_wire.messages import Command, Message, SampleBatch, Skeleton
 from brachium_wire.plausible import fault
 from brachium_wire.topics import TOPICS
 
@@ -32,6 +32,7 @@ class Drop(Enum):
     SECOND_HOST = "second_host"
     SECOND_NODE = "second_node"
     OVERFLOW = "overflow"
+    DISK_FULL = "disk_full"
 
 
 class WireError(ValueError):
@@ -114,6 +115,42 @@ _batch_decoder: msgspec.msgpack.Decoder[SampleBatch | Command] = msgspec.msgpack
 )
 
 
+def decode_skeleton(payload: bytes, max_bytes: int) -> Skeleton:
+    """Return what `decode` returns for a skeleton, at a fifth of the time: a session has a hundred thousand.
+
+    As `decode_batch` does it: what is not taken here is left to `decode`.
+    """
+    if len(payload) <= max_bytes:
+        try:
+            message = _skeleton_decoder.decode(payload)
+        except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError):
+            pass
+        else:
+            if type(message) is Skeleton and _numbers_sound(message) and fault(message) is None:
+                return message
+    return decode(payload, Skeleton, max_bytes)
+
+
+_skeleton_decoder: msgspec.msgpack.Decoder[Skeleton | Command] = msgspec.msgpack.Decoder(Skeleton | Command)
+
+
+def _numbers_sound(skeleton: Skeleton) -> bool:
+    """Return whether the floats are finite, but for the quaternions, whose lengths are checked, and the
+    integers int64. The sum of numbers is finite only if every one of them is."""
+    total = sum(skeleton.angles.values()) + sum(skeleton.angle_sd.values())
+    for place in skeleton.positions.values():
+        total += sum(place)
+    for vector in (skeleton.shoulder_shift, skeleton.shoulder_shift_sd):
+        if vector is not None:
+            total += sum(vector)
+    largest = max(skeleton.time_ns, skeleton.received_ns or 0)
+    return (
+        isfinite(total)
+        and largest < _INT64
+        and all((pose.sequence or 0) < _INT64 for pose in skeleton.segments.values())
+    )
+
+
 def convert(value: dict[str, object], kind: type[T]) -> T:
     """Return an unpacked map as a message of type `kind`, or raise WireError."""
     tag = kind.__struct_config__.tag
@@ -134,6 +171,10 @@ def convert(value: dict[str, object], kind: type[T]) -> T:
 def decode_topic(payload: bytes, topic: str) -> Message:
     """Return the message that the topic table promises for `topic`, or raise WireError."""
     row = TOPICS[topic]
+    if row.message is Skeleton:
+        return decode_skeleton(payload, row.max_bytes)
+    if row.message is SampleBatch:
+        return decode_batch(payload, row.max_bytes)
     return decode(payload, row.message, row.max_bytes)
 
 

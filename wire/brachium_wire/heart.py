@@ -24,6 +24,7 @@ class Heart:
         self.drops: Counter[str] = Counter()
         self.waiting: list[str] = []
         self.text = ""
+        self.alarm = ""
         self.end = bus.announce(keys.alive(room, kind, service_id))
 
     def beat(self, *, now: bool = False) -> None:
@@ -41,5 +42,6 @@ class Heart:
             drops=dict(self.drops),
             waiting=list(self.waiting),
             text=self.text,
+            alarm=self.alarm,
         )
         self._bus.put(self._key, encode(health))

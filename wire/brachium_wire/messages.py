@@ -258,6 +258,8 @@ class Health(Message, frozen=True, kw_only=True, tag="health/1"):
     """Nodes that asked to join and are not assigned."""
     text: str = ""
     """One line for people."""
+    alarm: str = ""
+    """What somebody must see to now, and how: one line. Empty while all is well."""
 
 
 class Command(Message, frozen=True, kw_only=True, tag="command/1"):

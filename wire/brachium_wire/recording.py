@@ -1,7 +1,9 @@
 """Recordings: the bus bytes unchanged in an MCAP file, one channel a key, in order of arrival.
 
-A file that was not closed (power, kill -9) holds all but the last half second: `read` reads it up to the cut,
-`recover` turns it into a closed, indexed one.
+A file that was not closed holds all but the last half second after a kill, and all but the last two seconds
+after a loss of power: `read` reads it up to the cut, `recover` turns it into a closed, indexed one. On a full
+disk `write` or `tick` raises OSError; `close` then still writes what waits, index and footer, for which room
+was kept.
 """
 
 import os
@@ -17,6 +19,7 @@ from mcap.reader import make_reader
 from mcap.writer import Writer
 
 from brachium_wire import keys, schema
+from brachium_wire.growing_file import GrowingFile
 from brachium_wire.reading import DAMAGE, MAGIC, PROFILE, Reading, Recorded, RecordingError
 from brachium_wire.topics import TOPICS
 
@@ -36,8 +39,12 @@ __all__ = [
 ]
 
 ENCODING = "msgpack"
-FLUSH_NS = 500_000_000
-SYNC_NS = 1_000_000_000
+FLUSH_NS = 200_000_000
+"""Half a second may be lost to a kill: the way to here and a busy machine have the rest of it."""
+SYNC_NS = 500_000_000
+"""Two seconds may be lost with the power: a slow disk may take as long again, and longer."""
+INDEX_BYTES, INDEX_BYTES_A_KEY = 100, 10
+"""Of each chunk in the index at the file's end, at most."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -80,12 +87,18 @@ class RecordingWriter:
         self._last_ns = 0
         self._flush_due: int | None = None
         self._sync_due: int | None = None
-        self._file = path.open("xb")  # buffered: mcap loses the footer of a raw file
-        _lock(self._file)
+        self._index_bytes = 0
+        self._file = GrowingFile(path)
+        _lock(self._file.raw)
         self._writer: Any = cast(Any, Writer)(self._file)  # not fully typed
         self._writer.start(profile=PROFILE)
         self._writer.add_metadata(PROFILE, dict(metadata or {}))
-        self._writer.flush()
+        self._file.push()
+
+    @property
+    def synced(self) -> int:
+        """Return how many bytes of the file are on the disk itself, whatever happens to the power."""
+        return self._file.synced
 
     def write(self, key: str, payload: bytes, log_time_ns: int) -> None:
         """Append one message; a time that does not grow becomes 1 ns after the last, so that file order is
@@ -104,14 +117,22 @@ class RecordingWriter:
         self.tick(log_time_ns)
 
     def tick(self, time_ns: int) -> None:
-        """Bring to the file what is 0.5 s old, and to the disk about each second; call it when idle too."""
+        """Bring to the file what is 0.2 s old, and to the disk each 0.5 s; call it when idle too.
+
+        Raises OSError when the disk takes no more: close it then, and write no more.
+        """
         if self._flush_due is None or self._sync_due is None:
             self._flush_due, self._sync_due = time_ns + FLUSH_NS, time_ns + SYNC_NS
         if time_ns >= self._flush_due:
+            before = self._file.tell()
             self._writer.flush()
+            if self._file.tell() > before:
+                self._index_bytes += INDEX_BYTES + INDEX_BYTES_A_KEY * len(self._channels)
+                self._file.reserve(self._index_bytes)
+            self._file.push()
             self._flush_due = time_ns + FLUSH_NS
         if time_ns >= self._sync_due:
-            os.fsync(self._file.fileno())
+            self._file.sync()
             self._sync_due = time_ns + SYNC_NS
 
     def close(self) -> None:
@@ -120,8 +141,6 @@ class RecordingWriter:
             return
         try:
             self._writer.finish()
-            self._file.flush()
-            os.fsync(self._file.fileno())
         finally:
             self._file.close()
 
@@ -182,7 +201,8 @@ def is_being_written(path: Path) -> bool:
 def recover(path: Path) -> RecoverReport:
     """Rewrite a recording that was not closed into a closed and indexed one, in its place.
 
-    Raises RecordingError when it is no recording, or while another process still writes it.
+    Raises RecordingError when it is no recording, or while another process still writes it, and OSError
+    without room for it; the file is then as it was.
     """
     with path.open("rb") as held, read(path) as reading:
         if not _lock(held):
@@ -192,9 +212,13 @@ def recover(path: Path) -> RecoverReport:
             return RecoverReport(path=path, messages=dict(counts), recovered=False, warning=reading.warning)
         fresh = path.with_name(path.name + ".recovering")
         fresh.unlink(missing_ok=True)  # of a recovery that was itself cut short
-        with RecordingWriter(fresh, {**reading.metadata, "recovered": "true"}) as writer:
-            for message in reading:
-                writer.write(*message)
+        try:
+            with RecordingWriter(fresh, {**reading.metadata, "recovered": "true"}) as writer:
+                for message in reading:
+                    writer.write(*message)
+        except OSError:
+            fresh.unlink(missing_ok=True)
+            raise
         fresh.replace(path)
     return RecoverReport(path=path, messages=dict(writer.counts), recovered=True, warning=reading.warning)
 

@@ -7,7 +7,7 @@ import argparse
 from pathlib import Path
 
 from brachium.option_types import duration_s
-from brachium.shell import add_json, add_network, print_json, stop_on_signals
+from brachium.shell import Failed, add_json, add_network, print_json, stop_on_signals
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
@@ -41,4 +41,6 @@ def run(args: argparse.Namespace) -> int:
         print(f"{report.path}: " + ", ".join(f"{n} {topic}" for topic, n in sorted(report.messages.items())))
         for reason, count in sorted(report.dropped.items()):
             print(f"  not recorded: {count} ({reason})")
+    if report.ended:
+        raise Failed(report.ended)
     return 1 if report.missing else 0

@@ -150,6 +150,11 @@ class PageState:
             "sensors": [frames.sensor(n) for n in shown],
             "waiting": report.waiting,
             "services": {s.kind: s.up for s in sorted(report.services, key=lambda s: s.up)},
+            "alarms": [
+                {"what": "recording", "reason": s.alarm}
+                for s in report.services
+                if s.kind == "recorder" and s.alarm
+            ],
             "sides": self.sides(),
             "calibration": frames.calibration(subject.calibration),
             "session": frames.session(subject.session),

@@ -180,7 +180,8 @@ class _Server:
                     seat.put_state(text)
 
     def _state_now(self, now_ns: int) -> str:
-        return _text({**self._state.state(now_ns), **self._sessions.state(self._state.subject)})
+        state, session = self._state.state(now_ns), self._sessions.state(self._state.subject)
+        return _text({**state, **session, "alarms": state["alarms"] + session["alarms"]})
 
     def _greet(self) -> Seat:
         seat = Seat()
