@@ -9,7 +9,7 @@ import numpy as np
 
 from brachium_body.ranges import FUNCTIONAL, REFERENCE, Range
 from brachium_body.segments import part_of
-from brachium_viewer.exercises import EXERCISES
+from brachium_viewer.exercises import EXERCISES, Exercise
 from brachium_viewer.health import NodeHealth
 from brachium_viewer.marks import ExerciseBegins
 from brachium_viewer.scene import lean
@@ -129,13 +129,37 @@ def hello(room: str) -> Json:
     return {
         "kind": "hello",
         "room": room,
-        "exercises": [
-            {"name": e.name, "angle": e.angle, "rises": e.rises, "goal_deg": e.goal_deg}
-            for e in EXERCISES.values()
-        ],
+        "exercises": [_exercise(row) for row in EXERCISES.values()],
         "reference": {name: _pair(row) for name, row in REFERENCE.items()},
         "functional": {name: _pair(row) for name, row in FUNCTIONAL.items()},
     }
+
+
+def _exercise(row: Exercise) -> Json:
+    band, need = _bands(row)
+    return {
+        "name": row.name,
+        "angle": row.angle,
+        "rises": row.rises,
+        "goal_deg": row.goal_deg,
+        "band": band,
+        "need": need,
+    }
+
+
+def _bands(row: Exercise) -> tuple[list[float | None] | None, float | None]:
+    """Return the reference band of an exercise's angle, and what daily activities need of it.
+
+    An elevation in a plane that has a name is held against that movement's range; in any other there is none.
+    """
+    if row.angle in REFERENCE:
+        need = FUNCTIONAL.get(row.angle)
+        return _pair(REFERENCE[row.angle]), None if need is None else need.high
+    if row.plane == "extension":
+        low, needed = REFERENCE["shoulder_flexion"].low, FUNCTIONAL["shoulder_flexion"].low
+        return [0.0, None if low is None else -low], None if needed is None else -needed
+    name = {"flexion": "shoulder_flexion", "abduction": "shoulder_abduction"}.get(row.plane or "")
+    return (None, None) if name is None else ([0.0, REFERENCE[name].high], FUNCTIONAL[name].high)
 
 
 def _pair(row: Range) -> list[float | None]:

@@ -1,8 +1,174 @@
-import "./theme.js";
+// The therapist's page: puts its parts together, and hands each what concerns it.
+
+import { Calibration } from "./calibration.js";
 import { Link } from "./link.js";
-import { speak } from "./words.js";
+import { Numbers } from "./numbers.js";
+import { $, busy, make, renew, tell } from "./page.js";
+import { People } from "./people.js";
+import { Picture } from "./picture.js";
+import { Plan } from "./plan.js";
+import { clearRatings, showRatings } from "./ratings.js";
+import { showHeadline, showParts, showSensors } from "./sensors.js";
+import { Tabs } from "./tabs.js";
+import { switchTheme } from "./theme.js";
+import { sounds, switchSound } from "./tone.js";
+import { language, say, speak } from "./words.js";
+
+let state = null;
+let set = 1;
+let up = false;
+
 await speak();
-const out = document.getElementById("numbers");
-const seen = {};
-const show = () => { out.textContent = JSON.stringify(seen, null, 1); };
-const link = new Link({ hello: (m) => { seen.hello = m; }, frame: (m) => { seen.frame = m; show(); }, state: (m) => { seen.state = m; show(); } });
+const picture = new Picture($("picture"));
+const numbers = new Numbers();
+const tabs = new Tabs($("tabs"));
+const plan = new Plan(() => meant());
+const link = new Link({ hello, frame, state: news, line });
+const calibration = new Calibration(link);
+const people = new People(link);
+showRatings(link);
+
+function hello(message) {
+  plan.offer(message.exercises);
+  meant();
+}
+
+function line(now) {
+  up = now;
+  if (state) showHeadline(state, up);
+  document.body.classList.toggle("cut", !up);
+}
+
+function frame(message) {
+  showParts(message.arms);
+  numbers.frame(message);
+  picture.show(message.arms, message.set?.over ? numbers.side : null);
+}
+
+/** What the numbers are about: the set that runs, else what is chosen. */
+function meant() {
+  if (!plan.exercises) return;
+  const running = state?.set;
+  const row = plan.exercises.get(running?.exercise) ?? plan.exercise;
+  const words = running ?? plan.words;
+  numbers.mean({ row, side: words.side, goal: words.goal_deg, limit: words.limit_deg });
+  const wanted = running ? running.repetitions : words.repetitions;
+  $("count-wanted").textContent = wanted == null ? "" : say("of", { wanted });
+  $("count-set").textContent = say("set", { set: running?.set ?? set, sets: words.sets });
+  $("start").textContent = words.sets > 1 ? say("start.set", { set, sets: words.sets }) : say("start");
+}
+
+function news(message) {
+  if (state && state.subject !== message.subject) {
+    set = 1;
+    numbers.ended = null;
+    clearRatings();
+  }
+  state = message;
+  showHeadline(state, up);
+  showSensors(state);
+  people.show(state);
+  calibration.show(state.calibration);
+  plan.sides(state.sides.length ? state.sides : ["right"], state.session?.side);
+  $("origin").hidden = state.origin === "worn";
+  $("origin").textContent = say(`origin.${state.origin}`);
+  $("start").hidden = state.set !== null;
+  $("stop").hidden = state.set === null;
+  $("start").disabled = state.sides.length === 0;
+  recording();
+  history();
+  meant();
+}
+
+function recording() {
+  const { state: how, seconds } = state.recording;
+  $("recording").hidden = how !== "on";
+  const time = `${Math.floor((seconds ?? 0) / 60)}:${String((seconds ?? 0) % 60).padStart(2, "0")}`;
+  $("recording").textContent = say("recording", { time });
+  const alarms = state.alarms.map(({ what, reason }) => say(`alarm.${what}`, { reason }));
+  renew($("alarm"), alarms.join(), () => alarms.map((text) => make("p", {}, text)));
+}
+
+function history() {
+  $("history-none").hidden = state.history.length > 0;
+  renew($("history"), JSON.stringify(state.history) + language, () =>
+    state.history.map((one) => {
+      const when = new Date(one.started).toLocaleDateString(language, { dateStyle: "medium" });
+      const what = one.sets.map((row) => say("history.set", { exercise: say(`exercise.${row.exercise}`), count: row.count ?? "–" }));
+      const name = make("span", {}, make("strong", {}, when), ` ${what.join(", ")}`);
+      const open = one.report ? [make("a", { href: one.report, target: "_blank", rel: "noopener" }, say("report.open"))] : [];
+      return make("li", {}, name, ...open);
+    }),
+  );
+}
+
+$("start").addEventListener("click", async () => {
+  tabs.show($("tab-exercise"));
+  const answer = await busy($("start"), () => link.ask("exercise", { ...plan.words, set }));
+  tell($("action-said"), answer);
+  if (answer.ok) $("stop").focus();
+});
+
+$("stop").addEventListener("click", async () => {
+  const answer = await busy($("stop"), () => link.ask("stop"));
+  if (answer.ok) numbers.ended = answer.data.set;
+  const last = set >= plan.words.sets;
+  tell($("action-said"), answer, say("set.done", { count: answer.data?.set?.count ?? 0 }));
+  if (answer.ok) set = last ? 1 : set + 1;
+  if (answer.ok && last) tabs.show($("tab-finish"));
+  meant();
+});
+
+$("mark").addEventListener("click", async () => {
+  tell($("action-said"), await busy($("mark"), () => link.ask("mark")), say("mark.done"));
+});
+
+$("report").addEventListener("click", async () => {
+  $("report-open").hidden = true;
+  tell($("report-said"), { ok: true }, say("report.making"));
+  const answer = await busy($("report"), () => link.ask("report"));
+  tell($("report-said"), answer, say("report.done", { file: answer.data?.recording ?? "" }));
+  if (!answer.ok) return;
+  set = 1;
+  clearRatings();
+  $("report-open").hidden = !answer.data.report;
+  if (answer.data.report) {
+    $("report-open").href = answer.data.report;
+    $("report-open").focus();
+  }
+});
+
+for (const button of document.querySelectorAll("#views button")) {
+  button.addEventListener("click", () => {
+    for (const one of document.querySelectorAll("#views button")) one.setAttribute("aria-pressed", String(one === button));
+    picture.view(button.dataset.view, [numbers.side]);
+  });
+}
+picture.turned = () => {
+  for (const one of document.querySelectorAll("#views button")) one.setAttribute("aria-pressed", "false");
+};
+
+$("theme").addEventListener("click", switchTheme);
+$("sound").addEventListener("click", () => {
+  switchSound();
+  soundSaid();
+});
+
+function soundSaid() {
+  $("sound").textContent = say(sounds() ? "sound.on" : "sound.off");
+}
+soundSaid();
+
+function otherLanguage() {
+  const other = language === "en" ? "de" : "en";
+  $("language").lang = other;
+  $("language").textContent = { en: "English", de: "Deutsch" }[other];
+  return other;
+}
+otherLanguage();
+$("language").addEventListener("click", async () => {
+  await speak(otherLanguage());
+  otherLanguage();
+  soundSaid();
+  if (state) news(state);
+});

@@ -1,0 +1,164 @@
+// The angle over the last seconds: measured as a line, what is not measured as a broken one, nothing where nothing is.
+
+import uPlot from "../vendor/uplot/uPlot.esm.js";
+import { MEASURED } from "./quality.js";
+import { number, say } from "./words.js";
+
+const WINDOW_S = 24;
+const PAUSE_MS = 90; // between two drawings: fast enough for an eye, and cheap
+const STEP_S = 0.03;
+const GAP_S = 0.3;
+
+function colour(name) {
+  return getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+}
+
+export class Chart {
+  constructor(box) {
+    this.box = box;
+    this.marks = {};
+    this.clear();
+    this.make();
+    new ResizeObserver(() => this.plot.setSize(this.size())).observe(box);
+    document.addEventListener("theme", () => this.make());
+    document.addEventListener("language", () => this.make());
+  }
+
+  clear() {
+    this.times = [];
+    this.measured = [];
+    this.doubtful = [];
+    this.drawn = 0;
+  }
+
+  size() {
+    return { width: Math.max(this.box.clientWidth, 80), height: Math.max(this.box.clientHeight, 80) };
+  }
+
+  make() {
+    this.plot?.destroy();
+    const axis = {
+      stroke: colour("--muted"),
+      grid: { stroke: colour("--line"), width: 1 },
+      ticks: { show: false },
+      font: "12px system-ui, sans-serif",
+    };
+    this.plot = new uPlot(
+      {
+        ...this.size(),
+        padding: [10, 12, 0, 0],
+        legend: { show: false },
+        cursor: { show: false },
+        scales: { x: { time: false }, y: { range: () => this.range() } },
+        axes: [
+          { ...axis, size: 26, values: (plot, ticks) => ticks.map((at) => `${number(at).replace("-", "−")} s`) },
+          { ...axis, size: 46, values: (plot, ticks) => ticks.map((at) => `${number(at).replace("-", "−")}°`) },
+        ],
+        series: [
+          {},
+          { stroke: colour("--trace"), width: 2.5, spanGaps: false, points: { show: false } },
+          { stroke: colour("--muted"), width: 2, dash: [4, 4], spanGaps: false, points: { show: false } },
+        ],
+        hooks: { drawAxes: [(plot) => this.under(plot)] },
+      },
+      [[-WINDOW_S, 0], [null, null], [null, null]],
+      this.box,
+    );
+    this.draw();
+  }
+
+  /** Say what belongs to the angle: {band, need, goal, limit, rises}. A change of angle empties the course. */
+  mean(angle, marks) {
+    if (angle !== this.angle) this.clear();
+    this.angle = angle;
+    this.marks = marks;
+    this.draw();
+  }
+
+  range() {
+    const { band, goal, limit, need } = this.marks;
+    const known = [...this.measured, ...this.doubtful, ...(band ?? []), goal, limit, need].filter((value) => value != null);
+    if (known.length === 0) return [0, 180];
+    return [Math.min(...known) - 10, Math.max(...known) + 12];
+  }
+
+  /** Take one angle: at `t` ms, degrees or null, and its quality. */
+  add(t, value, quality) {
+    const now = t / 1000;
+    const last = this.times.at(-1);
+    if (last !== undefined && now < last + STEP_S) return;
+    if (last !== undefined && now > last + GAP_S) this.push(last + STEP_S, null, null); // what was not measured is no line
+    this.push(now, MEASURED.has(quality) ? value : null, MEASURED.has(quality) ? null : value);
+    while (this.times[0] < now - WINDOW_S) {
+      this.times.shift();
+      this.measured.shift();
+      this.doubtful.shift();
+    }
+    if (performance.now() - this.drawn > PAUSE_MS) this.draw();
+  }
+
+  push(time, measured, doubtful) {
+    this.times.push(time);
+    this.measured.push(measured);
+    this.doubtful.push(doubtful);
+  }
+
+  draw() {
+    this.drawn = performance.now();
+    const end = this.times.at(-1) ?? 0;
+    const times = this.times.map((time) => time - end);
+    const data = times.length ? [times, this.measured, this.doubtful] : [[-WINDOW_S, 0], [null, null], [null, null]];
+    this.plot.batch(() => {
+      this.plot.setData(data, false);
+      this.plot.setScale("x", { min: -WINDOW_S, max: 0 });
+    });
+  }
+
+  /** The band, the lines and their words, below the course. */
+  under(plot) {
+    const { band, goal, limit, need, rises } = this.marks;
+    const { ctx, bbox } = plot;
+    const ratio = devicePixelRatio;
+    const at = (value) => plot.valToPos(value, "y", true);
+    ctx.save();
+    ctx.beginPath();
+    ctx.rect(bbox.left, bbox.top, bbox.width, bbox.height);
+    ctx.clip();
+    ctx.font = `600 ${12 * ratio}px system-ui, sans-serif`;
+    if (band) {
+      ctx.fillStyle = colour("--band");
+      ctx.fillRect(bbox.left, at(band[1]), bbox.width, at(band[0]) - at(band[1]));
+      this.word(ctx, say("reference"), bbox.left + 6 * ratio, at(band[1]) + 14 * ratio, "--good", "left");
+    }
+    if (limit != null) {
+      ctx.fillStyle = colour("--bad-soft");
+      const edge = at(limit);
+      if (rises) ctx.fillRect(bbox.left, bbox.top, bbox.width, edge - bbox.top);
+      else ctx.fillRect(bbox.left, edge, bbox.width, bbox.top + bbox.height - edge);
+    }
+    const right = bbox.left + bbox.width - 6 * ratio;
+    this.line(ctx, bbox, need, at, "--ink", [2, 4], say("need"), right, -5);
+    this.line(ctx, bbox, goal, at, "--goal", [8, 5], say("goal"), right, -5);
+    this.line(ctx, bbox, limit, at, "--bad", [], say("limit"), bbox.left + bbox.width / 2, rises ? -5 : 14);
+    ctx.restore();
+  }
+
+  line(ctx, bbox, value, at, name, dash, word, x, below) {
+    if (value == null) return;
+    const ratio = devicePixelRatio;
+    ctx.strokeStyle = colour(name);
+    ctx.lineWidth = 2 * ratio;
+    ctx.setLineDash(dash.map((part) => part * ratio));
+    ctx.beginPath();
+    ctx.moveTo(bbox.left, at(value));
+    ctx.lineTo(bbox.left + bbox.width, at(value));
+    ctx.stroke();
+    this.word(ctx, `${word} ${number(value)}°`, x, at(value) + below * ratio, name, "right");
+  }
+
+  word(ctx, text, x, y, name, side) {
+    ctx.fillStyle = colour(name);
+    ctx.textAlign = side;
+    ctx.fillText(text, x, y);
+  }
+}
