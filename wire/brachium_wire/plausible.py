@@ -51,8 +51,10 @@ def _session(session: Session) -> str | None:
 
 def _turns(names: str, quaternions: Iterable[Quaternion | None]) -> str | None:
     for q in quaternions:
-        if q is not None and not abs(sqrt(sum(x * x for x in q)) - 1.0) <= LENGTH_TOLERANCE:
-            return f"{names} must be of length 1, came {q}"
+        if q is not None:
+            w, x, y, z = q
+            if not abs(sqrt(w * w + x * x + y * y + z * z) - 1.0) <= LENGTH_TOLERANCE:
+                return f"{names} must be of length 1, came {q}"
     return None
 
 

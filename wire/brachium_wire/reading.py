@@ -3,15 +3,17 @@
 import logging
 import struct
 from collections.abc import Generator, Iterator
+from io import BytesIO
 from pathlib import Path
 from types import TracebackType
 from typing import NamedTuple, Self
 
 import zstandard
+from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
+from mcap.opcode import Opcode
 from mcap.records import Channel, Chunk, Header, Metadata
-from mcap.records import Message as McapMessage
-from mcap.stream_reader import StreamReader, breakup_chunk
+from mcap.stream_reader import StreamReader, get_chunk_data_stream
 
 log = logging.getLogger(__name__)
 
@@ -109,19 +111,17 @@ class Reading:
 
     def _unpack(self, chunk: Chunk) -> Iterator[Recorded]:
         try:
-            records = breakup_chunk(chunk, validate_crc=True)
+            channels, messages = _in_chunk(chunk)
         except DAMAGE:
             self._bad_chunks += 1
             return
-        for record in records:
-            if isinstance(record, Channel):
-                self._channels[record.id] = record.topic
-            elif isinstance(record, McapMessage):
-                key = self._channels.get(record.channel_id)
-                if key is None:
-                    self._unnamed += 1
-                else:
-                    yield Recorded(key, record.data, record.log_time)
+        self._channels.update(channels)
+        for channel, log_time_ns, data in messages:
+            key = self._channels.get(channel)
+            if key is None:
+                self._unnamed += 1
+            else:
+                yield Recorded(key, data, log_time_ns)
 
     def _conclude(self) -> None:
         said = []
@@ -135,3 +135,35 @@ class Reading:
             )
         if said:
             self.warning = f"{self.path}: {'; '.join(said)}"
+
+
+def _in_chunk(chunk: Chunk) -> tuple[dict[int, str], list[tuple[int, int, bytes]]]:
+    """Return a chunk's channels, number to key, and its messages: channel, log time in ns, bytes.
+
+    Ten times as fast as mcap's own way, which makes an object of every field: a session is 100 000 messages.
+    Raises one of DAMAGE.
+    """
+    stream, size = get_chunk_data_stream(chunk, validate_crc=True)
+    data, at = stream.read(size), 0
+    channels: dict[int, str] = {}
+    messages: list[tuple[int, int, bytes]] = []
+    while at < size:
+        opcode, length = _RECORD.unpack_from(data, at)
+        at += _RECORD.size
+        end = at + length
+        if end > size:
+            raise ValueError("a record is longer than its block")
+        if opcode == Opcode.MESSAGE:
+            number, _, log_time_ns, _ = _MESSAGE.unpack_from(data, at)
+            messages.append((number, log_time_ns, data[at + _MESSAGE.size : end]))
+        elif opcode == Opcode.CHANNEL:
+            channel = Channel.read(ReadDataStream(BytesIO(data[at:end])))
+            channels[channel.id] = channel.topic
+        at = end
+    return channels, messages
+
+
+_RECORD = struct.Struct("<BQ")
+"""Kind and length of what follows."""
+_MESSAGE = struct.Struct("<HIQQ")
+"""Channel, sequence, log time, publish time."""

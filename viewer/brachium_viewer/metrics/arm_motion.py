@@ -1,6 +1,6 @@
 """One arm's motion as arrays: what every measure takes. Pure."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -74,15 +74,15 @@ def arm_motion(skeletons: Sequence[Skeleton], zero_ns: int = 0) -> ArmMotion:
     words = np.full((n, len(COLUMNS) + len(JOINTS)), "missing", dtype="<U16")
     places = np.full((len(JOINTS), n, 3), np.nan)
     shift = np.full((n, 3), np.nan)
+    _fill([s.angles for s in skeletons], _COLUMN, angles)
+    _fill([s.positions for s in skeletons], _JOINT, places.transpose(1, 0, 2))
+    words[:, : len(COLUMNS)][np.isfinite(angles)] = "good"
+    words[:, len(COLUMNS) :][np.isfinite(places).all(axis=2).T] = "good"
     for i, skeleton in enumerate(skeletons):
-        for name, value in skeleton.angles.items():
-            if name in _COLUMN:
-                angles[i, _COLUMN[name]] = value
-                words[i, _COLUMN[name]] = skeleton.assumed.get(name, "good")
-        for name, place in skeleton.positions.items():
-            if name in _JOINT:
-                places[_JOINT[name], i] = place
-                words[i, len(COLUMNS) + _JOINT[name]] = skeleton.assumed.get(name, "good")
+        for name, quality in skeleton.assumed.items():
+            column = _WORD.get(name)
+            if column is not None and words[i, column] == "good":
+                words[i, column] = quality
         if skeleton.shoulder_shift is not None:
             shift[i] = skeleton.shoulder_shift
     return ArmMotion(
@@ -101,3 +101,19 @@ def arm_motion(skeletons: Sequence[Skeleton], zero_ns: int = 0) -> ArmMotion:
 
 _COLUMN = {name: i for i, name in enumerate(COLUMNS)}
 _JOINT = {name: i for i, name in enumerate(JOINTS)}
+_WORD = {name: i for i, name in enumerate((*COLUMNS, *JOINTS))}
+
+
+def _fill(rows: Sequence[Mapping[str, object]], columns: Mapping[str, int], out: Floats) -> None:
+    """Put what each row (n,) holds by name into its columns of out (n, k) or (n, k, 3).
+
+    Rows that hold the same names are put in at once: an arm has the same angles for minutes.
+    """
+    alike: dict[tuple[str, ...], list[int]] = {}
+    for i, row in enumerate(rows):
+        alike.setdefault(tuple(row), []).append(i)
+    for names, which in alike.items():
+        held = [k for k, name in enumerate(names) if name in columns]
+        if held:
+            table = np.array([tuple(rows[i].values()) for i in which], dtype=np.float64)
+            out[np.ix_(which, [columns[names[k]] for k in held])] = table[:, held]
