@@ -5,7 +5,7 @@ import { Link } from "../app/link.js";
 import { counted, sounds, switchSound, warn } from "../app/tone.js";
 import { say, speak } from "../app/words.js";
 import { missing, led, after, nextSet, offered } from "./steps.js";
-import { armMoves, openSettings } from "./settings.js";
+import { armMoves, showSettings } from "./settings.js";
 import { Screens } from "./screens.js";
 import { named } from "./pictures.js";
 import { hush, speakOut } from "./voice.js";
@@ -15,6 +15,7 @@ const STOP_AGAIN_MS = 1000;
 const room = { exercises: [], state: null, frame: null, up: false };
 const mine = {
   step: "begin",
+  aside: false, // at the settings; the step waits
   side: null,
   exercise: 0,
   sets: {}, // how many of each exercise were begun from here
@@ -41,6 +42,7 @@ function show() {
 
 function enter(step) {
   mine.step = step;
+  mine.aside = false;
   mine.refused = "";
   if (step === "pain") mine.pain = null;
   screens.enter(side(), choices());
@@ -116,6 +118,12 @@ const OTHER = {
   done: () => enter("exercise"),
 };
 
+function setAside(aside) {
+  mine.aside = aside;
+  showSettings();
+  screens.enter(side(), choices());
+}
+
 /** The set ends at once; why is asked afterwards, and told as well. */
 function stop() {
   mine.over = room.state?.set?.from ?? mine.over;
@@ -163,10 +171,10 @@ const link = new Link({
 });
 
 for (const element of document.querySelectorAll("[data-picture]")) element.append(named(element.dataset.picture));
-document.getElementById("go").addEventListener("click", () => GO[mine.step]?.());
+document.getElementById("go").addEventListener("click", () => (mine.aside ? setAside(false) : GO[mine.step]?.()));
 document.getElementById("other").addEventListener("click", () => OTHER[mine.step]?.());
 document.getElementById("stop").addEventListener("click", stop);
-document.getElementById("choose").addEventListener("click", openSettings);
+document.getElementById("choose").addEventListener("click", () => setAside(!mine.aside));
 document.getElementById("sound").addEventListener("click", () => {
   switchSound();
   if (!sounds()) hush();

@@ -2,6 +2,7 @@
 
 import { BODY, SHOULDER, draw, line, disc, path, picture } from "./drawing.js";
 
+const WIDE = 260; // an arm stretched out to the side, and the arrow around it
 const UPPER = [46, 16];
 const FORE = [40, 14];
 const HAND = [14, 12];
@@ -81,11 +82,11 @@ export function move(name, side) {
   const parts = [...BODY[body]()];
   if (body === "front" && !degrees) parts.push(...BODY.farArm());
   if (thing) parts.push(disc(...thing, 9, "thing"));
-  if (twist) parts.push(path("M134 108 A9 20 0 1 1 131 146", "way"), path("M140 139 L130 147 L127 135", "way"));
+  if (twist) parts.push(path("M122 98 A12 32 0 1 1 113 150", "way"), path("M104 139 L112 151 L123 142", "way"));
   else parts.push(limb(at, links, "ghost"), arrow(at, links, "arrow"));
   const held = cup ? [path("M-8 10 L8 10 L6 26 L-6 26 Z", "thing")] : [];
   parts.push(limb(at, links, "moving", held));
   if (degrees) parts.push(plan(degrees));
-  const flip = side === "left" ? { transform: "translate(200 0) scale(-1 1)" } : {};
-  return picture(200, 240, draw("g", flip, ...parts));
+  const flip = side === "left" ? { transform: `translate(${WIDE} 0) scale(-1 1)` } : {};
+  return picture(WIDE, 240, draw("g", flip, ...parts));
 }

@@ -39,9 +39,14 @@ export class Screens {
     }
   }
 
+  /** The section that is to be seen. */
+  get section() {
+    return this.mine.aside ? "settings" : this.mine.step;
+  }
+
   /** Show a step anew: its section alone, its name under the reader's eye. */
   enter(side, choices) {
-    const { step } = this.mine;
+    const step = this.section;
     document.body.dataset.step = step;
     for (const section of document.querySelectorAll("[data-step]")) {
       if (section !== document.body) section.hidden = section.dataset.step !== step;
@@ -55,7 +60,7 @@ export class Screens {
 
   /** What is said aloud of the step shown. */
   spoken() {
-    const section = document.querySelector(`section[data-step="${this.mine.step}"]`);
+    const section = document.querySelector(`section[data-step="${this.section}"]`);
     return [...section.querySelectorAll("h1, .what")].map((element) => element.textContent).filter(Boolean).join(" ");
   }
 
@@ -64,7 +69,8 @@ export class Screens {
   }
 
   show(side, choices) {
-    const { step, refused, busy } = this.mine;
+    const { refused, busy } = this.mine;
+    const step = this.section;
     const { state, up } = this.room;
     const origin = state?.origin ?? "worn";
     id("origin").hidden = origin === "worn";
@@ -91,7 +97,8 @@ export class Screens {
   }
 
   buttons(choices, busy, refused) {
-    const { step, pain, last } = this.mine;
+    const { pain, last } = this.mine;
+    const step = this.section;
     const name = (key) => (has(key) ? say(key) : "");
     let go = name(`patient.go.${step}`);
     let other = name(`patient.other.${step}`);
@@ -150,14 +157,14 @@ export class Screens {
 
   exercise(choices, side) {
     const { name } = choices[this.mine.exercise % Math.max(1, choices.length)] ?? { name: "free" };
-    texted(id("exercise-name"), say(`exercise.${name}`));
+    texted(id("exercise-name"), say(`patient.exercise.${name}`));
     texted(id("exercise-what"), say(`exercise.${name}.what`));
     id("exercise-picture").replaceChildren(move(name, side));
   }
 
   doing() {
     const { exercise, side } = this.mine.last ?? { exercise: "free", side: "right" };
-    texted(id("do-name"), say(`exercise.${exercise}`));
+    texted(id("do-name"), say(`patient.exercise.${exercise}`));
     this.counted = 0;
     this.lowest = null;
     this.shownBeads = "";
@@ -175,7 +182,7 @@ export class Screens {
 
   /** The newest picture of the arm, and how far the set is: a count and beads, never degrees. */
   drawFrame(side) {
-    if (this.mine.step !== "do") return;
+    if (this.section !== "do") return;
     const arm = this.room.frame?.arms[side];
     const set = this.room.frame?.set;
     const plan = this.mine.last;

@@ -7,7 +7,7 @@ const SIZE = "brachium-size";
 const HAND = "brachium-hand";
 const SIZES = [100, 150, 200];
 const root = document.documentElement;
-const dialog = document.getElementById("settings");
+const place = document.getElementById("settings");
 let hand = localStorage.getItem(HAND);
 
 function size() {
@@ -24,7 +24,7 @@ export function armMoves(side) {
   root.dataset.hand = hand ?? (side === "left" ? "right" : "left");
 }
 
-function show() {
+export function showSettings() {
   root.dataset.size = size();
   const now = {
     language: say(`patient.set.${language}`),
@@ -32,7 +32,7 @@ function show() {
     hand: say(root.dataset.hand === "left" ? "patient.set.hand.left" : "patient.set.hand.right"),
     theme: say(dark() ? "patient.set.dark" : "patient.set.light"),
   };
-  for (const button of dialog.querySelectorAll("[data-setting]")) {
+  for (const button of place.querySelectorAll("[data-setting]")) {
     if (button.dataset.setting in now) button.textContent = now[button.dataset.setting];
   }
 }
@@ -46,19 +46,13 @@ const CHANGE = {
     root.dataset.hand = hand;
   },
   theme: switchTheme,
-  close: () => dialog.close(),
 };
 
-export function openSettings() {
-  show();
-  dialog.showModal();
-}
-
-dialog.addEventListener("click", async (event) => {
+place.addEventListener("click", async (event) => {
   const button = event.target.closest("[data-setting]");
   if (!button) return;
   await CHANGE[button.dataset.setting]();
-  show();
+  showSettings();
 });
 armMoves("right");
 root.dataset.size = size();
