@@ -113,6 +113,16 @@ def test_a_command_that_is_none_is_said() -> None:
         judge(Trial(command=("no-such-node",), node="n", token="t", patience=QUICK))
 
 
+def test_nothing_is_kept_where_nobody_calls() -> None:
+    words = (sys.executable, "-c", "raise SystemExit(3)")
+    patience = Patience(start_s=3.0)
+    verdicts = judge(Trial(command=words, node="n", token="t", patience=patience))
+    assert [v.rule for v in verdicts] == list(RULES)
+    assert [v.rule for v in verdicts if v.outcome == "failed"] == ["request"]
+    assert "nobody called in 3 s; the command ended with 3" in verdicts[0].says
+    assert {v.outcome for v in verdicts[1:]} == {"not claimed"}
+
+
 def kept_whole(verdicts: list[Verdict], not_claimed: set[str]) -> None:
     assert [v for v in verdicts if v.outcome == "failed"] == []
     assert {v.rule for v in verdicts if v.outcome == "not claimed"} == not_claimed

@@ -45,5 +45,7 @@ def run(args: argparse.Namespace) -> int:
     else:
         for verdict in verdicts:
             print(f"{verdict.rule:<22}{verdict.outcome:<13}{verdict.says}")
-        print(f"{len(verdicts) - len(broken)} of {len(verdicts)} rules kept or not claimed")
+        kept = sum(verdict.outcome == "ok" for verdict in verdicts)
+        others = len(verdicts) - kept - len(broken)
+        print(f"{kept} rules kept, {others} not claimed, {len(broken)} broken")
     return 1 if broken else 0

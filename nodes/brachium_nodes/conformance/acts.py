@@ -77,12 +77,13 @@ def greet(caller: Caller) -> None:
     caller.frame(ws.BINARY, msgspec.msgpack.encode({**msgspec.msgpack.decode(encode(welcome)), "xyz": [1]}))
 
 
-def door(play: Play) -> None:
-    """Refuse it at the door some times."""
+def door(play: Play) -> bool:
+    """Refuse it at the door some times; return whether it called at all."""
     first = play.stage.accept(play.trial.patience.start_s)
     if first is None:
-        play.verdicts.append(failed("request", "nobody called"))
-        return
+        text = f"nobody called in {play.trial.patience.start_s:g} s{play.trial.end_told()}"
+        play.verdicts.append(failed("request", text))
+        return False
     play.verdicts.append(judged("request", first.request_fault(), "GET /node"))
     play.verdicts.append(judged("token", _token_fault(first, play.trial.token), "in the header alone"))
     times = [time.monotonic()]
@@ -103,6 +104,7 @@ def door(play: Play) -> None:
     else:
         fine = min(waits) >= SHORTEST_S and max(waits) <= LONGEST_S and waits[-1] > waits[0]
         play.verdicts.append(judged("back-off", "" if fine else text, text))
+    return True
 
 
 def _token_fault(caller: Caller, token: str) -> str:

@@ -65,6 +65,8 @@ def _faults(rule: str, heard: list[Heard]) -> Verdict:
     count = sum(one.messages for one in heard)
     if rule == "batches" and not fault and not any(one.batches for one in heard):
         fault = "no batch at all"
+    if not count and not fault:
+        return not_claimed(rule, "no message came")
     return judged(rule, fault, f"{count} messages on {len(heard)} connections")
 
 
@@ -141,6 +143,8 @@ def _answered(one: Heard) -> Verdict:
         return failed("clock answered", one.faults["clock answered"])
     if asked and not one.exchanges:
         return failed("clock answered", f"no answer to {asked} questions")
+    if not asked:
+        return not_claimed("clock answered", "the trial did not come so far")
     newest_ns = max((e.asked_ns for e in one.exchanges), default=0)
     left = sum(asked_ns < newest_ns - PATIENCE_NS for asked_ns in one.asked.values())
     return judged(

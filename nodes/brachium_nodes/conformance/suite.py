@@ -21,7 +21,8 @@ def judge(trial: Trial, seek_port: int | None = None) -> list[Verdict]:
         trial.start()
         if seek_port is not None:
             proof(play, seek_port)
-        door(play)
+        if not door(play):
+            return _nobody_called(play.verdicts)
         caller = play.call(trial.patience.return_s)
         for act in (*ACTS, outage):
             if caller is None:
@@ -32,6 +33,12 @@ def judge(trial: Trial, seek_port: int | None = None) -> list[Verdict]:
         trial.stop()
         stage.end()
     return _in_order([*play.verdicts, *judging.quiet(trial.quiet), *judging.over_all(play.heard, trial.node)])
+
+
+def _nobody_called(verdicts: list[Verdict]) -> list[Verdict]:
+    """Return one verdict a rule where there is nothing to judge by."""
+    told = {verdict.rule: verdict for verdict in verdicts}
+    return [told.get(rule) or not_claimed(rule, "cannot be told: nobody called") for rule in RULES]
 
 
 def _in_order(verdicts: list[Verdict]) -> list[Verdict]:

@@ -94,6 +94,12 @@ class Trial:
         """Return whether the command has ended by itself."""
         return self._process is not None and self._process.poll() is not None
 
+    def end_told(self) -> str:
+        """Return how the command ended by itself and where its words are, to be put behind a verdict."""
+        if self._process is None or self._process.poll() is None:
+            return ""
+        return f"; the command ended with {self._process.returncode}, --log FILE keeps what it says"
+
     def wait(self, seconds: float) -> None:
         """Let time pass."""
         time.sleep(seconds)
