@@ -157,7 +157,7 @@ class Desk:
         if self._state.running is not None:
             await self._end(subject, "stopped")
         await asyncio.sleep(HEARD_S)  # what was said last is still on its way to the recording
-        return await self._sessions.finish(subject, self._state.session(subject), self._state.origin())
+        return await self._sessions.finish(subject)
 
     async def _mark(self, subject: str, mark: marks.Mark, text: str = "") -> Json:
         await self._sessions.begin(self._bus, subject)

@@ -100,10 +100,6 @@ class PageState:
         """Return whether anything was heard of a subject."""
         return subject in self._subjects
 
-    def session(self, subject: str) -> Session | None:
-        """Return what is known of a subject's body."""
-        return self._subjects[subject].session if subject in self._subjects else None
-
     def instant_ns(self, now_ns: int) -> int:
         """Return the instant of the newest skeleton shown, or `now_ns` when there is none: a mark's time."""
         live = [a.skeleton.time_ns for a in self._arms().values() if now_ns - a.heard_ns < MISSING_NS]

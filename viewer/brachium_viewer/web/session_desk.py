@@ -1,17 +1,18 @@
-"""A session as the page keeps it: its recording, what is stored of it, and its report."""
+"""A session as the pages keep it: its recording, what is stored of it, and its report."""
 
 import asyncio
 import logging
 import re
 import threading
 import time
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from brachium_viewer import recorder
+from brachium_viewer.web import keeping
 from brachium_wire import keys
 from brachium_wire.bus import Bus
-from brachium_wire.messages import Session
 
 log = logging.getLogger(__name__)
 
@@ -20,14 +21,15 @@ Json = dict[str, Any]
 READY_S = 10.0
 LOOK_S = 0.05
 CLOSE_S = 20.0
+_REPORT = re.compile(r"[A-Za-z0-9_-][A-Za-z0-9_.-]{0,120}")
 
 
 class NoRecording(ValueError):
-    """The recording did not begin: one line that says why."""
+    """There is no recording, or it did not begin: one line that says why."""
 
 
 class SessionDesk:
-    """One session at a time; its recorder runs in a thread of its own."""
+    """One session at a time; its recorder runs in a thread of its own. Called on one event loop."""
 
     def __init__(self, folder: Path, endpoint: str, room: str, service_id: str) -> None:
         self.folder = folder
@@ -36,50 +38,52 @@ class SessionDesk:
         )
         self._stop = threading.Event()
         self._thread: threading.Thread | None = None
-        self._report: recorder.RecordReport | None = None
+        self._closed: recorder.RecordReport | None = None
         self._begun_s = 0.0
         self._beginning = asyncio.Lock()
+        self._looking: set[asyncio.Task[None]] = set()
+        self._history: tuple[str | None, list[Json]] = (None, [])
         self.subject: str | None = None
         """Whose session is recorded."""
         self.failure = ""
-        """Why recording stopped; empty while it goes on."""
+        """Why recording did not begin or stopped; empty while it goes on."""
 
     async def begin(self, bus: Bus, subject: str) -> None:
         """Record from now on, if not yet. Raises NoRecording."""
         async with self._beginning:
-            if self._thread is not None:
-                return
-            await asyncio.to_thread(self._start, bus, subject)
+            if self._thread is None:
+                await asyncio.to_thread(self._start, bus, subject)
 
-    async def finish(self, subject: str, body: Session | None, origin: str) -> Json:
-        """Close the recording and return where its report is. Raises NoRecording when there was none."""
-        del body, origin
+    async def finish(self, subject: str) -> Json:
+        """Close the recording, keep its session, make its report. Raises NoRecording when there was none."""
         if self._thread is None:
             raise NoRecording("nothing was recorded yet: start an exercise first")
         await asyncio.to_thread(self.close)
-        if self._report is None:
+        if self._closed is None:
             raise NoRecording(self.failure or "the recording could not be closed")
-        return {"recording": self._report.path.name, "subject": subject}
+        path = self._closed.path
+        told: Json = {"recording": path.name, "subject": subject, "report": None, "ended": self._closed.ended}
+        told |= await asyncio.to_thread(keeping.apart, keeping.keep, path, subject)
+        page = keeping.report_page(path)
+        if page.is_file():
+            told["report"] = keeping.report_link(page)
+        self._history = None, []
+        return told
 
     def state(self, subject: str | None) -> Json:
         """Return what a page shows of the recording, of alarms and of what was before."""
-        del subject
+        if subject is not None and subject != self._history[0]:
+            self._history = subject, []
+            self._later(self._look(subject))
         alarms = [{"what": "recording", "reason": self.failure}] if self.failure else []
-        return {"recording": self._recording(), "alarms": alarms, "history": []}
+        return {"recording": self._recording(), "alarms": alarms, "history": self._history[1]}
 
     def report_file(self, name: str) -> Path | None:
         """Return the page of a session's report; None for one that is not there."""
-        if not re.fullmatch(r"[A-Za-z0-9_.-]{1,120}", name):
+        if not _REPORT.fullmatch(name):
             return None
         path = self.folder / f"{name}.html"
         return path if path.is_file() else None
-
-    def _recording(self) -> Json:
-        if self.failure:
-            return {"state": "failed", "seconds": None}
-        if self._thread is None:
-            return {"state": "off", "seconds": None}
-        return {"state": "on", "seconds": round(time.monotonic() - self._begun_s)}
 
     def close(self) -> None:
         """End the recorder, if it runs."""
@@ -89,8 +93,15 @@ class SessionDesk:
         if thread is not None:
             thread.join(CLOSE_S)
 
+    def _recording(self) -> Json:
+        if self.failure:
+            return {"state": "failed", "seconds": None}
+        if self._thread is None:
+            return {"state": "off", "seconds": None}
+        return {"state": "on", "seconds": round(time.monotonic() - self._begun_s)}
+
     def _start(self, bus: Bus, subject: str) -> None:
-        self._stop, self.failure, self._report = threading.Event(), "", None
+        self._stop, self.failure, self._closed = threading.Event(), "", None
         thread = threading.Thread(target=self._run, args=(subject, self._stop), name="recorder")
         thread.start()
         token = keys.services(self._settings.room, f"recorder/{self._settings.id}/alive")
@@ -103,10 +114,22 @@ class SessionDesk:
         self._thread, self._begun_s, self.subject = thread, time.monotonic(), subject
 
     def _run(self, subject: str, stop: threading.Event) -> None:
-        from dataclasses import replace
-
         try:
-            self._report = recorder.run(replace(self._settings, subject=subject), stop)
+            self._closed = recorder.run(replace(self._settings, subject=subject), stop)
         except Exception as error:
             log.exception("the recording of %s stopped", subject)
             self.failure = " ".join(str(error).split())[:300] or type(error).__name__
+
+    async def _look(self, subject: str) -> None:
+        try:
+            found = await asyncio.to_thread(keeping.earlier, self.folder, subject)
+        except Exception as error:
+            log.warning("earlier sessions of %s cannot be read: %s", subject, error)
+            return
+        if self._history[0] == subject:
+            self._history = subject, found
+
+    def _later(self, work: Any) -> None:
+        task = asyncio.get_running_loop().create_task(work)
+        self._looking.add(task)
+        task.add_done_callback(self._looking.discard)

@@ -137,9 +137,9 @@ export class Chart {
       else ctx.fillRect(bbox.left, edge, bbox.width, bbox.top + bbox.height - edge);
     }
     const right = bbox.left + bbox.width - 6 * ratio;
-    this.line(ctx, bbox, need, at, "--ink", [2, 4], say("need"), right, -5);
+    this.line(ctx, bbox, need, at, "--ink", [2, 4], say("need"), bbox.left + 0.45 * bbox.width, -5);
     this.line(ctx, bbox, goal, at, "--goal", [8, 5], say("goal"), right, -5);
-    this.line(ctx, bbox, limit, at, "--bad", [], say("limit"), bbox.left + bbox.width / 2, rises ? -5 : 14);
+    this.line(ctx, bbox, limit, at, "--bad", [], say("limit"), bbox.left + 0.7 * bbox.width, rises ? -5 : 14);
     ctx.restore();
   }
 
@@ -157,8 +157,13 @@ export class Chart {
   }
 
   word(ctx, text, x, y, name, side) {
-    ctx.fillStyle = colour(name);
     ctx.textAlign = side;
+    ctx.setLineDash([]);
+    ctx.lineWidth = 4 * devicePixelRatio;
+    ctx.lineJoin = "round";
+    ctx.strokeStyle = colour("--surface");
+    ctx.strokeText(text, x, y);
+    ctx.fillStyle = colour(name);
     ctx.fillText(text, x, y);
   }
 }

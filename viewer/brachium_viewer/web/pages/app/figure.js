@@ -6,7 +6,7 @@ import { MEASURED } from "./quality.js";
 const CHEST = 1.38; // m above the floor: the picture shows a pose, not a body's height
 const HIP = new THREE.Vector3(0, 0, -0.46); // where a leaning trunk turns, from the chest
 const COLOURS = { upper_arm: 0xe69f00, forearm: 0x3a9bd6, hand: 0x009e73 };
-const NOT_MEASURED = 0x9aa3ab;
+const NOT_MEASURED = 0x8a939b;
 const BEYOND = 0xd55e00;
 
 const LIMBS = [
@@ -86,8 +86,6 @@ class Arm {
       limb.place(new THREE.Vector3(...first), new THREE.Vector3(...last));
       const measured = !arm.stale && MEASURED.has(arm.parts[part]);
       surface.color.setHex(!measured ? NOT_MEASURED : beyond ? BEYOND : COLOURS[part]);
-      surface.transparent = !measured;
-      surface.opacity = measured ? 1 : 0.55;
     }
   }
 }

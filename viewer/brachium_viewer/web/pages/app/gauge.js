@@ -7,6 +7,9 @@ const WIDE = 340;
 const EDGE = 14;
 const TOP = 26;
 const HIGH = 18;
+const ABOVE = 15; // where words stand
+const BELOW = 60;
+const WORDS = 150; // two words nearer than this would touch
 const SVG = "http://www.w3.org/2000/svg";
 
 function element(name, words, text) {
@@ -18,7 +21,7 @@ function element(name, words, text) {
 
 export class Gauge {
   constructor(box) {
-    this.svg = element("svg", { viewBox: `0 0 ${WIDE} 74`, role: "img" });
+    this.svg = element("svg", { viewBox: `0 0 ${WIDE} 88`, role: "img" });
     box.append(this.svg);
   }
 
@@ -35,17 +38,18 @@ export class Gauge {
     add("rect", { class: "track", x: EDGE, y: TOP, width: WIDE - 2 * EDGE, height: HIGH, rx: 9 });
     if (band) {
       add("rect", { class: "band", x: this.at(band[0]), y: TOP, width: this.at(band[1]) - this.at(band[0]), height: HIGH, rx: 4 });
-      add("text", { x: WIDE / 2, y: 72, "text-anchor": "middle" }, say("reference.range", { low: number(band[0]), high: number(band[1]) }));
+      add("text", { x: WIDE / 2, y: 85, "text-anchor": "middle" }, say("reference.range", { low: number(band[0]), high: number(band[1]) }));
     } else {
-      add("text", { x: WIDE / 2, y: 72, "text-anchor": "middle" }, say("reference.none"));
+      add("text", { x: WIDE / 2, y: 85, "text-anchor": "middle" }, say("reference.none"));
     }
     if (limit != null) {
       const [x, end] = rises ? [this.at(limit), WIDE - EDGE] : [EDGE, this.at(limit)];
       add("rect", { class: "forbidden", x, y: TOP, width: Math.max(end - x, 0), height: HIGH, rx: 4 });
-      this.tick("limit", limit, say("limit"), 12);
+      this.tick("limit", limit, say("limit"), BELOW);
     }
-    if (goal != null) this.tick("goal", goal, say("goal"), 12);
-    if (need != null) this.tick("need", need, say("need"), 58);
+    if (goal != null) this.tick("goal", goal, say("goal"), ABOVE);
+    const close = limit != null && need != null && Math.abs(this.at(limit) - this.at(need)) < WORDS;
+    if (need != null) this.tick("need", need, say("need"), close ? BELOW + 13 : BELOW);
     this.now = element("path", { class: "now" });
     this.svg.append(this.now);
     this.svg.setAttribute("aria-label", band ? say("reference.range", { low: number(band[0]), high: number(band[1]) }) : say("reference.none"));

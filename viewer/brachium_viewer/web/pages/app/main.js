@@ -54,7 +54,7 @@ function meant() {
   numbers.mean({ row, side: words.side, goal: words.goal_deg, limit: words.limit_deg });
   const wanted = running ? running.repetitions : words.repetitions;
   $("count-wanted").textContent = wanted == null ? "" : say("of", { wanted });
-  $("count-set").textContent = say("set", { set: running?.set ?? set, sets: words.sets });
+  $("count-set").textContent = say("set", { set: running?.set ?? numbers.ended?.number ?? set, sets: words.sets });
   $("start").textContent = words.sets > 1 ? say("start.set", { set, sets: words.sets }) : say("start");
 }
 
@@ -105,13 +105,14 @@ function history() {
 $("start").addEventListener("click", async () => {
   tabs.show($("tab-exercise"));
   const answer = await busy($("start"), () => link.ask("exercise", { ...plan.words, set }));
+  numbers.ended = null;
   tell($("action-said"), answer);
   if (answer.ok) $("stop").focus();
 });
 
 $("stop").addEventListener("click", async () => {
   const answer = await busy($("stop"), () => link.ask("stop"));
-  if (answer.ok) numbers.ended = answer.data.set;
+  if (answer.ok) numbers.ended = { ...answer.data.set, number: set };
   const last = set >= plan.words.sets;
   tell($("action-said"), answer, say("set.done", { count: answer.data?.set?.count ?? 0 }));
   if (answer.ok) set = last ? 1 : set + 1;

@@ -31,7 +31,7 @@ class Stepper {
     const label = make("label", { for: `plan-${name}`, "data-say": name });
     const head = make("div", { class: "with-check" }, label);
     if (optional) {
-      this.check = make("input", { type: "checkbox", "data-say-label": `${name}.use` });
+      this.check = make("input", { id: `use-${name}`, type: "checkbox", "data-say-label": `${name}.use` });
       this.check.checked = on;
       this.check.addEventListener("change", () => this.used());
       head.prepend(this.check);
