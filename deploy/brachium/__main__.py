@@ -25,7 +25,10 @@ COMMANDS: dict[str, str] = {
     "conformance": "try any node from outside against the rules of the node protocol",
     "firmware": "compile the wearables' firmware, or run it on this machine",
     "solve": "a capture folder or a recording to angles, positions and orientations",
+    "report": "a session for its therapist: one page that prints, and a table of repetitions",
+    "sessions": "subjects and their sessions: list, show, add, export, import, delete",
     "compare": "error statistics between two results",
+    "export": "a recording or a result as a file that OpenSim, Mokka, Blender or a spreadsheet opens",
     "evaluate": "the accuracy tables: both papers' experiments, and real recordings",
     "doctor": "what works on this machine, what does not, and what to do",
     "bench": "the performance figures of this machine",
@@ -40,7 +43,9 @@ def main(argv: list[str] | None = None) -> int:
         print(_help())
         return 0
     if words[0] == "--version":
-        print(_version())
+        from brachium.version import version
+
+        print(version())
         return 0
     if words[0] not in COMMANDS:
         print(_unknown(words[0]), file=sys.stderr)
@@ -62,15 +67,6 @@ def _help() -> str:
         "this version:  brachium --version\n\n"
         "A measuring and research tool, not a medical device."
     )
-
-
-def _version() -> str:
-    from importlib import metadata
-
-    try:
-        return f"brachium {metadata.version('brachium')}"
-    except metadata.PackageNotFoundError:
-        return "brachium, from its source tree"
 
 
 def _unknown(word: str) -> str:

@@ -3,6 +3,7 @@
 from typing import Any
 
 from brachium.node_promises import NODE_PROOFS
+from brachium.page_promises import PAGE_PROOFS
 from brachium.proofs import Promise, Proof, figure
 
 BROAD = {
@@ -150,4 +151,5 @@ PROOFS: tuple[Proof, ...] = (
     *(_accuracy(name, tables) for name, tables in ACCURACY.items()),
     _bench(),
     *NODE_PROOFS,
+    *PAGE_PROOFS,
 )

@@ -22,6 +22,7 @@ EXTRAS = {
     "pylsl": "lsl",
     "cantools": "can",
     "segno": "site",
+    "ezc3d": "export",
     "aiohttp": "web",
 }
 """Heavy packages and the extra that brings each."""

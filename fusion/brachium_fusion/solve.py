@@ -13,10 +13,10 @@ from brachium_fusion import best, from_capture, from_recording
 from brachium_fusion.best_arm import solve_arm
 from brachium_fusion.best_material import Material
 from brachium_fusion.orientation import FilterName
-from brachium_fusion.result import tabulate
 from brachium_fusion.result_quality import assumptions
 from brachium_fusion.settings import Settings
 from brachium_fusion.shoulder_model import NOT_OBSERVABLE_WITHOUT_STERNUM
+from brachium_fusion.solve_table import tabled
 from brachium_fusion.solve_terms import (
     MODES,
     NO_CALIBRATION,
@@ -39,6 +39,11 @@ def run(settings: SolveSettings) -> SolveReport:
 
     Raises SolveError, and the errors of brachium_wire.capture, recording and table, each one line.
     """
+    return _finish(settings, outcome_of(settings))
+
+
+def outcome_of(settings: SolveSettings) -> Outcome:
+    """Solve the input and write nothing. Raises what `run` raises."""
     if settings.rate_hz is not None and not 1.0 <= settings.rate_hz <= 2000.0:
         raise SolveError(f"--rate must be 1 to 2000 Hz, not {settings.rate_hz:g}")
     if settings.mode not in MODES:
@@ -46,12 +51,18 @@ def run(settings: SolveSettings) -> SolveReport:
     if settings.mode == "best" and settings.filter not in (None, "auto"):
         raise SolveError(f"--mode best has a way of its own: leave --filter {settings.filter} out")
     if settings.input.is_dir():
-        return _finish(settings, _capture(settings))
+        return _some(settings, _capture(settings))
     if not settings.input.exists():
         raise SolveError(
             f"{settings.input}: no such file or folder; give a recording (.mcap) or a capture folder"
         )
-    return _finish(settings, _recording(settings))
+    return _some(settings, _recording(settings))
+
+
+def _some(settings: SolveSettings, outcome: Outcome) -> Outcome:
+    if not outcome.skeletons:
+        raise SolveError(f"{settings.input}: no instant could be solved; is any segment of an arm in it?")
+    return outcome
 
 
 def _split(name: FilterName | ZhouName | None) -> tuple[ZhouName | None, FilterName | None]:
@@ -180,27 +191,10 @@ def _best_recording(
 
 def _finish(settings: SolveSettings, outcome: Outcome) -> SolveReport:
     skeletons, chosen, alignment = outcome.skeletons, outcome.chosen, outcome.alignment
-    if not skeletons:
-        raise SolveError(f"{settings.input}: no instant could be solved; is any segment of an arm in it?")
     forward, assumed = skeletons[-1].forward, assumptions(skeletons)
     if settings.out is not None:
-        result = tabulate(skeletons, outcome.times_ns, outcome.times_s, settings.groups)
-        table.write(
-            settings.out,
-            result.columns,
-            result.units,
-            {
-                "made_by": "brachium solve",
-                "input": settings.input.name,
-                "filter": _split(settings.filter)[0] or chosen.filter,
-                "magnetometer": outcome.magnetometer,
-                "mode": settings.mode,
-                "forward": forward,
-                "origin": skeletons[-1].origin,
-                "assumed": assumed,
-                **outcome.metadata,
-            },
-        )
+        made = tabled(settings, outcome)
+        table.write(settings.out, made.columns, made.units, made.metadata)
     quality: dict[str, Counter[str]] = {}
     first = skeletons[0].side
     for skeleton in skeletons:

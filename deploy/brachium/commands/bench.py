@@ -6,6 +6,7 @@ brachium bench --quick
   brachium bench --can load --json
   brachium bench --hostile 1000000 --json
   brachium bench --sensors --chips 10 --json
+  brachium bench --exports
 """
 
 import argparse
@@ -34,12 +35,17 @@ def configure(parser: argparse.ArgumentParser) -> None:
         "--hostile", type=whole(1, 100_000_000), metavar="FRAMES", help="instead: a gateway under attack"
     )
     other.add_argument("--sensors", action="store_true", help="instead: how well sensors are calibrated")
+    other.add_argument(
+        "--exports", action="store_true", help="instead: how exported files agree in others' readers"
+    )
     parser.add_argument("--chips", type=whole(1, 1000), default=10, help="of --sensors")
     other.add_argument(
         "--can",
         choices=["load", "mixing", "faults"],
         help="instead: what CAN sensors cost; whether their samples mix; what a machine hears of a fault",
     )
+    other.add_argument("--recorder", action="store_true", help="instead: what a kill or a full disk costs")
+    parser.add_argument("--kills", type=whole(1, 1000), default=20, help="of --recorder")
     parser.add_argument("--nodes", type=whole(1, 500), default=256, help="of --gateway")
     parser.add_argument("--runs", type=whole(1, 10_000), default=200, help="of --clock")
     add_json(parser)
@@ -47,13 +53,27 @@ def configure(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Measure, one network after the other."""
-    if args.gateway or args.clock or args.sensors or args.can or args.hostile is not None:
+    if args.exports:
+        return _exports(args)
+    parts = (args.gateway, args.clock, args.sensors, args.can, args.recorder)
+    if any(parts) or args.hostile is not None:
         return _other(args)
     figures = measure(QUICK_WINDOW_S if args.quick else WINDOW_S, args.arms)
     if args.json:
         print_json(figures)
     else:
         print(text(figures))
+    return 0
+
+
+def _exports(args: argparse.Namespace) -> int:
+    from brachium import bench_exports
+
+    found = bench_exports.measure()
+    if args.json:
+        print_json(found)
+    else:
+        print(bench_exports.text(found))
     return 0
 
 
@@ -72,6 +92,10 @@ def _other(args: argparse.Namespace) -> int:
         from brachium import bench_sensors
 
         found = bench_sensors.measure(args.chips)
+    elif args.recorder:
+        from brachium import bench_recorder
+
+        found = bench_recorder.measure(args.kills)
     elif args.can:
         from brachium import bench_can
 

@@ -1,6 +1,7 @@
 """Turn a recording or a capture folder into a table of angles, positions and orientations.
 
 brachium solve recording.mcap --out angles.csv
+  brachium solve recording.mcap --settings arm.c3d --out again.csv
 """
 
 import argparse
@@ -35,14 +36,19 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--mode",
         choices=("live", "best"),
-        default="live",
-        help="live: what the live service would give; best: from the whole recording, past and future",
+        help="live (default): what the live service would give; best: from the whole recording",
     )
     parser.add_argument("--no-mag", action="store_true", help="leave magnetometers aside")
     parser.add_argument(
         "--rate", type=real(1.0, 1000.0), metavar="HZ", help="instants a second (default: as the input)"
     )
     parser.add_argument("--columns", metavar="GROUP,..", help="groups of columns, as in clinical,positions")
+    parser.add_argument(
+        "--settings",
+        type=Path,
+        metavar="FILE",
+        help="as the numbers in this result or exported file were solved; other options come first",
+    )
     add_json(parser)
 
 
@@ -53,6 +59,8 @@ def run(args: argparse.Namespace) -> int:
     from brachium_fusion.result import GROUPS
     from brachium_fusion.zhou_recording import ZHOU
 
+    if args.settings is not None:
+        _as_before(args)
     if args.filter is not None and args.filter not in (*FILTERS, *ZHOU):
         known = ", ".join((*FILTERS, *ZHOU))
         raise Usage(f"--filter {args.filter!r} is not known; choose one of {known}")
@@ -66,7 +74,7 @@ def run(args: argparse.Namespace) -> int:
             filter=args.filter,
             magnetometer=not args.no_mag,
             rate_hz=args.rate,
-            mode=args.mode,
+            mode=args.mode or "live",
             groups=_groups(args.columns, GROUPS),
         )
     )
@@ -75,6 +83,21 @@ def run(args: argparse.Namespace) -> int:
     else:
         print(_words(args.input, report))
     return 0
+
+
+def _as_before(args: argparse.Namespace) -> None:
+    """Take from the file of --settings what no other option says."""
+    from brachium_viewer.export.about import settings
+
+    said = settings(args.settings)
+    args.filter = args.filter or said.get("filter")
+    args.mode = args.mode or said.get("mode")
+    args.rate = args.rate or said.get("rate_hz")
+    args.no_mag = args.no_mag or said.get("magnetometer") is False
+    if args.columns is None and isinstance(said.get("columns"), list):
+        args.columns = ",".join(said["columns"])
+    if not args.input.is_dir():
+        args.subject = args.subject or said.get("subject")
 
 
 def figures(report: "SolveReport") -> dict[str, object]:

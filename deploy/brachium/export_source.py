@@ -1,0 +1,69 @@
+"""What is exported: a result as it is, a recording's live skeletons, a capture folder solved on the way."""
+
+from pathlib import Path
+
+from brachium.shell import Usage
+from brachium_fusion import from_recording, solve
+from brachium_fusion.result import tabulate
+from brachium_fusion.result_quality import assumptions
+from brachium_fusion.solve_table import tabled
+from brachium_wire import recording, table
+from brachium_wire.messages import Skeleton
+from brachium_wire.table import Table
+
+SIDES = ("right", "left")
+
+
+def table_of(source: Path, subject: str | None) -> Table:
+    """Return the input's result table.
+
+    Raises Usage, FileNotFoundError and the errors of solve, recording and table, each one line.
+    """
+    if source.suffix in (".csv", ".parquet"):
+        return table.read(source)
+    if not source.is_dir():
+        found = _live(source, subject)
+        if found is not None:
+            return found
+    settings = solve.SolveSettings(input=source, subject=subject)
+    return tabled(settings, solve.outcome_of(settings))
+
+
+def _live(source: Path, subject: str | None) -> Table | None:
+    """Return a recording's skeletons as they were live; None when it has samples alone."""
+    with recording.read(source) as messages:
+        subjects = from_recording.sort_out(messages)
+    moving = {name: contents for name, contents in subjects.items() if contents.live}
+    if not moving or (subject is not None and subject not in moving):
+        return None
+    if subject is None and len(moving) > 1:
+        raise Usage(f"{source}: holds subjects {', '.join(moving)}; choose one with --subject")
+    name = subject or next(iter(moving))
+    contents = moving[name]
+    skeletons = contents.live
+    chosen = from_recording.settings_of(contents)
+    times_ns = sorted({s.time_ns for s in skeletons})
+    made = tabulate(skeletons, times_ns, [1e-9 * (t - times_ns[0]) for t in times_ns])
+    settings = {**chosen.plain(), "mode": "live", "subject": name, "rate_hz": chosen.rate_hz}
+    return Table(
+        made.columns,
+        made.units,
+        {
+            "input": source.name,
+            "filter": chosen.filter,
+            "mode": "live",
+            "forward": skeletons[-1].forward,
+            "origin": _origin(skeletons),
+            "sides": [side for side in SIDES if any(s.side == side for s in skeletons)],
+            "assumed": assumptions(skeletons),
+            "subject": name,
+            "time_zero_ns": times_ns[0],
+            "settings": settings,
+        },
+    )
+
+
+def _origin(skeletons: list[Skeleton]) -> str:
+    """Return where they come from; nothing that is in part emulated or played goes as worn."""
+    found = {s.origin for s in skeletons}
+    return next(origin for origin in ("emulated", "playback", "worn") if origin in found)

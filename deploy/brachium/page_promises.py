@@ -1,0 +1,72 @@
+"""What is promised of pages, sessions, reports and files: what people see and take home."""
+
+from typing import Any
+
+from brachium.proofs import Promise, Proof, Take, figure
+
+WITH_ANGLES = ("csv", "parquet", "sto", "mot", "c3d", "rrd", "motion-bids")
+WITH_PLACES = ("csv", "parquet", "trc", "c3d", "bvh", "rrd", "motion-bids")
+
+
+def _total(name: str) -> Take:
+    def take(figures: dict[str, Any]) -> float:
+        return float(sum(found[name] for found in figures["formats"].values()))
+
+    return take
+
+
+def _exports() -> Proof:
+    """Both arms in every format, read by others' readers."""
+    return Proof(
+        name="exports",
+        commands=(("bench", "--exports", "--json"),),
+        promises=(
+            *(
+                figure(f"{to}: angles apart", "deg", "formats", to, "angle_deg", at_most=0.1)
+                for to in WITH_ANGLES
+            ),
+            *(
+                figure(f"{to}: positions apart", "mm", "formats", to, "position_mm", at_most=1.0)
+                for to in WITH_PLACES
+            ),
+            Promise(
+                name="gaps that are none, or the other way", unit="1", take=_total("gaps_off"), at_most=0
+            ),
+            Promise(name="gaps", unit="1", take=_total("gaps")),
+            Promise(name="numbers compared", unit="1", take=_total("numbers")),
+        ),
+    )
+
+
+def _recorder() -> Proof:
+    """Recorders killed, power lost, a disk full."""
+    full = ("full_disk",)
+    return Proof(
+        name="recorder",
+        commands=(("bench", "--recorder", "--kills", "25", "--json"),),
+        promises=(
+            figure("lost to kill -9, worst", "s", "kill_worst_s", at_most=0.5),
+            figure("lost to kill -9, median", "s", "kill_median_s"),
+            *(
+                figure(f"lost with the power, tail {tail}, worst", "s", "power_worst_s", tail, at_most=2.0)
+                for tail in ("cut", "zeroed", "random")
+            ),
+            figure("messages missing before the last one", "1", "holes", at_most=0),
+            *(
+                Promise(
+                    name=f"full disk: {name}", unit="1", take=lambda f, k=key: not f["full_disk"][k], at_most=0
+                )
+                for name, key in (
+                    ("no alarm on the monitor", "on_monitor"),
+                    ("no alarm on the page", "on_page"),
+                    ("the file does not open whole", "opens"),
+                )
+            ),
+            figure("full disk: skeletons before", "Hz", *full, "skeletons_before_per_s"),
+            figure("full disk: skeletons afterwards", "Hz", *full, "skeletons_per_s"),
+            figure("full disk: frames of the page afterwards", "Hz", *full, "frames_per_s"),
+        ),
+    )
+
+
+PAGE_PROOFS: tuple[Proof, ...] = (_exports(), _recorder())

@@ -1,0 +1,127 @@
+"""A result table cut to a span, to some columns, to an even grid. Pure."""
+
+from collections.abc import Sequence
+from fnmatch import fnmatchcase
+
+import numpy as np
+import numpy.typing as npt
+
+from brachium_body import rotation
+from brachium_body.angles import CLAVICLE, COLUMNS, TRUNK
+from brachium_body.kinematics import JOINTS
+from brachium_body.segments import SEGMENTS
+from brachium_wire.table import Table, TableError
+
+Floats = npt.NDArray[np.float64]
+
+PARTS = ("w", "x", "y", "z")
+GAP_PERIODS = 1.5
+"""Two instants further apart than so many periods have a gap between them: nothing is put there."""
+SAME = 1e-4
+"""Of a period: an instant nearer to one that is there than this is that one."""
+
+
+def period_s(time_s: Floats) -> float:
+    """Return the usual time between instants (n,); raises TableError when there are not two."""
+    if len(time_s) < 2:
+        raise TableError(f"a motion needs two instants at least; there are {len(time_s)}")
+    return float(np.median(np.diff(time_s)))
+
+
+def between(table: Table, from_s: float | None, until_s: float | None) -> Table:
+    """Return the rows whose time, counted from the first row's, is in [from_s, until_s).
+
+    Raises TableError when none is.
+    """
+    since = table.columns["time"] - table.columns["time"][0] if len(table) else np.empty(0)
+    kept = (since >= (from_s or 0.0) - 1e-9) & (since < (np.inf if until_s is None else until_s) - 1e-9)
+    if not kept.any():
+        length = f"{since[-1]:.3g} s" if len(since) else "no row"
+        raise TableError(f"there is nothing from {from_s or 0:g} to {until_s} s: the motion has {length}")
+    return Table({name: values[kept] for name, values in table.columns.items()}, table.units, table.metadata)
+
+
+def chosen(table: Table, words: Sequence[str]) -> Table:
+    """Return the columns that the words name, with `time`.
+
+    A word is a group (GROUPS), a column, one without its ending `_r` or `_l`, or a pattern with `*`. Raises
+    TableError for one that names nothing.
+    """
+    kept = {"time"}
+    for word in words:
+        found = {name for name in table.columns if _named(name, word)}
+        if not found:
+            groups = ", ".join(GROUPS)
+            raise TableError(f"--columns {word!r} names nothing in it; give groups ({groups}) or columns")
+        kept |= found
+    columns = {name: values for name, values in table.columns.items() if name in kept}
+    return Table(columns, {n: u for n, u in table.units.items() if n in kept}, table.metadata)
+
+
+GROUPS = ("segments", "sensors", "positions", "shift", "theta", "clinical", "isb", "trunk", "quality")
+"""As `solve --columns` names them."""
+
+
+def _named(column: str, word: str) -> bool:
+    bare = column.removesuffix("_r").removesuffix("_l")
+    return word == _group(column) if word in GROUPS else any(fnmatchcase(n, word) for n in (column, bare))
+
+
+def _group(column: str) -> str:
+    bare = column.removesuffix("_r").removesuffix("_l")
+    if column.startswith("quality_"):
+        return "quality"
+    if bare in COLUMNS:
+        shared = {**dict.fromkeys((*TRUNK, *CLAVICLE), "trunk")}
+        first = "theta" if bare.startswith("theta") else "isb" if bare.startswith("isb_") else "clinical"
+        return shared.get(bare, first)
+    if bare.startswith("shoulder_shift_"):
+        return "shift"
+    if bare.rpartition("_")[0] in JOINTS:
+        return "positions"
+    return "sensors" if "_sensor_q" in column else "segments" if column[:-3] in SEGMENTS else ""
+
+
+def evenly(table: Table, rate_hz: float) -> Table:
+    """Return the table at first + k / rate_hz, k = 0, 1, ...: numbers on the line between their neighbours.
+
+    Where neighbours are further apart than GAP_PERIODS, or one of them is not known, nothing is known.
+    Orientations turn the shortest way; words are those of the neighbour before.
+    """
+    time_s = np.asarray(table.columns["time"], dtype=np.float64)
+    period = period_s(time_s)
+    count = int(np.floor((time_s[-1] - time_s[0]) * rate_hz + SAME)) + 1
+    wanted = time_s[0] + np.arange(count) / rate_hz
+    before = np.clip(np.searchsorted(time_s, wanted + SAME * period, side="right") - 1, 0, len(time_s) - 1)
+    after = np.minimum(before + 1, len(time_s) - 1)
+    step = time_s[after] - time_s[before]
+    fraction = np.where(step > 0.0, (wanted - time_s[before]) / np.where(step > 0.0, step, 1.0), 0.0)
+    fraction[np.abs(wanted - time_s[before]) <= SAME * period] = 0.0
+    gap = (step > GAP_PERIODS * period) & (fraction > 0.0)
+    columns = {}
+    for name, values in table.columns.items():
+        if name == "time":
+            columns[name] = wanted
+        elif values.dtype.kind == "f":
+            columns[name] = np.where(gap, np.nan, _line(values[before], values[after], fraction))
+        else:
+            columns[name] = np.where(gap, "", values[before]) if values.dtype.kind == "U" else values[before]
+    for stem in _orientations(table):
+        block = np.stack([table.columns[f"{stem}_q{part}"] for part in PARTS], axis=-1)
+        turned = np.where(
+            (fraction == 0.0)[:, None],
+            block[before],
+            rotation.slerp(block[before], block[after], fraction),
+        )
+        turned[gap] = np.nan
+        columns |= {f"{stem}_q{part}": turned[:, i] for i, part in enumerate(PARTS)}
+    return Table(columns, table.units, table.metadata)
+
+
+def _line(a: Floats, b: Floats, fraction: Floats) -> Floats:
+    return np.where(fraction == 0.0, a, a + fraction * (b - a))
+
+
+def _orientations(table: Table) -> list[str]:
+    names = [name.removesuffix("_qw") for name in table.columns if name.endswith("_qw")]
+    return [stem for stem in names if all(f"{stem}_q{part}" in table.columns for part in PARTS)]
