@@ -274,6 +274,8 @@ def test_a_standard_deviation_beyond_the_makers_limit_is_invalid_and_so_is_none(
         ("subject = 'p01'\n[joint.elbow_flexion]\nsign = 2", "sign"),
         ("subject = 'p01'\nrate_hz = 5", "20 to 200"),
         ("subject = 'p01'\nmax_age_ms = 5000", "10 to 500"),
+        ("subject = 'p01'\nmax_sd_deg = nan", "more than 0"),
+        ("subject = 'p01'\nmax_sd_deg = -3", "more than 0"),
     ],
 )
 def test_a_makers_table_that_cannot_be_is_named(tmp_path: Path, text: str, said: str):

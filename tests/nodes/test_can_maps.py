@@ -104,6 +104,7 @@ signals = ["GyrX", "GyrY", "GyrZ"]
         (TABLE.format(map="mti-600") + "mounting = [2, 0, 0, 0]", OWN, "no quaternion of length 1"),
         (TABLE.format(map="mti-600") + "add_to_ids = 0x7FF", OWN, "that is no CAN id"),
         (TABLE.format(map="mti-600") + "rate_hz = 0.1", OWN, "write 1 to 2000"),
+        (TABLE.format(map="mti-600") + "rate_hz = 0", OWN, "write 1 to 2000"),
         (TABLE.format(map="mti-600") + "colour = 1", OWN, "colour"),
         (2 * TABLE.format(map="mti-600"), OWN, "both send 0x"),
         (TABLE.format(map="mti-600") + TABLE.format(map="lpms-orientation"), OWN, "there twice"),

@@ -71,6 +71,8 @@ def read_joints(path: Path) -> JointTable:
         raise BadMap(f"{path}: rate_hz {table.rate_hz:g} cannot be used; write 20 to 200")
     if not 10.0 <= table.max_age_ms <= 500.0:
         raise BadMap(f"{path}: max_age_ms {table.max_age_ms:g} cannot be used; write 10 to 500")
+    if table.max_sd_deg is not None and not 0.0 < table.max_sd_deg <= 180.0:
+        raise BadMap(f"{path}: max_sd_deg {table.max_sd_deg:g} cannot be used; write more than 0, to 180")
     for name, row in table.joint.items():
         if not (isfinite(row.zero_deg) and isfinite(row.offset_deg)):
             raise BadMap(f"{path}: zero_deg and offset_deg of {name} must be numbers")

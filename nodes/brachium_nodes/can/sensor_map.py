@@ -66,7 +66,7 @@ def _sensor(path: Path, entry: SensorEntry, dbc: Path | None) -> CanSensor:
         raise BadMap(f"{path}: mounting of {entry.id} {list(entry.mounting)} is no quaternion of length 1")
     place = _map_path(path, entry.map)
     made = read_toml(place, SensorMap)
-    rate_hz = entry.rate_hz or made.rate_hz
+    rate_hz = made.rate_hz if entry.rate_hz is None else entry.rate_hz
     if not 1.0 <= rate_hz <= 2000.0:
         raise BadMap(f"{path}: rate {rate_hz:g} Hz of {entry.id} cannot be; write 1 to 2000")
     chosen = dbc or (path.parent / entry.dbc if entry.dbc else place.parent / made.dbc)
