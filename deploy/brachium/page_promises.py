@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from brachium.proofs import Promise, Proof, Take, figure
+from brachium.proofs import Promise, Proof, Take, at, figure
 
 WITH_ANGLES = ("csv", "parquet", "sto", "mot", "c3d", "rrd", "motion-bids")
 WITH_PLACES = ("csv", "parquet", "trc", "c3d", "bvh", "rrd", "motion-bids")
@@ -38,6 +38,15 @@ def _exports() -> Proof:
     )
 
 
+def _unless(*path: str) -> Take:
+    """Take 1 where the figure says no, or nothing."""
+
+    def take(figures: dict[str, Any]) -> float:
+        return 0.0 if at(*path)(figures) else 1.0
+
+    return take
+
+
 def _recorder() -> Proof:
     """Recorders killed, power lost, a disk full."""
     full = ("full_disk",)
@@ -53,9 +62,7 @@ def _recorder() -> Proof:
             ),
             figure("messages missing before the last one", "1", "holes", at_most=0),
             *(
-                Promise(
-                    name=f"full disk: {name}", unit="1", take=lambda f, k=key: not f["full_disk"][k], at_most=0
-                )
+                Promise(name=f"full disk: {name}", unit="1", take=_unless("full_disk", key), at_most=0)
                 for name, key in (
                     ("no alarm on the monitor", "on_monitor"),
                     ("no alarm on the page", "on_page"),
@@ -69,4 +76,22 @@ def _recorder() -> Proof:
     )
 
 
-PAGE_PROOFS: tuple[Proof, ...] = (_exports(), _recorder())
+def _page() -> Proof:
+    """The therapist's page drawn in software, beside a page that draws nothing."""
+    return Proof(
+        name="page",
+        commands=(("bench", "--page", "--json"),),
+        promises=(
+            figure("skeleton to picture, median", "ms", "page_p50_ms", at_most=60.0),
+            figure("skeleton to picture, 99 %", "ms", "page_p99_ms", at_most=150.0),
+            figure("pictures", "Hz", "page_hz"),
+            figure("an empty canvas, median", "ms", "empty_p50_ms"),
+            figure("an empty canvas, 99 %", "ms", "empty_p99_ms"),
+            figure("an empty canvas, pictures", "Hz", "empty_hz"),
+            figure("server with one screen, of a core", "1", "server_cpu", at_most=0.08),
+            figure("server with none, of a core", "1", "server_alone_cpu"),
+        ),
+    )
+
+
+PAGE_PROOFS: tuple[Proof, ...] = (_page(), _exports(), _recorder())

@@ -1,6 +1,7 @@
 """A file that is written for long, on a disk that may fill up or lose its power."""
 
 import os
+import sys
 import tempfile
 from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
@@ -23,7 +24,7 @@ class GrowingFile:
         if path.exists():
             raise FileExistsError(17, "the file is there already", str(path))
         self._reserve: IO[bytes] | None = tempfile.TemporaryFile(dir=path.parent)  # noqa: SIM115 - see release
-        self._reserved = 0
+        self._reserved, self._path = 0, path
         try:
             self.reserve(0)
             self.raw = path.open("xb", buffering=0)
@@ -32,7 +33,7 @@ class GrowingFile:
             raise
         self._waiting = bytearray()
         self._size = 0
-        self._syncing: Future[int] | None = None
+        self._syncing: Future[None] | None = None
         self._thread = ThreadPoolExecutor(1, thread_name_prefix="sync")
         self.synced = 0
         """Bytes that are on the disk itself, whatever happens to the power."""
@@ -71,12 +72,18 @@ class GrowingFile:
         if self._syncing is not None:
             if not self._syncing.done():
                 return
-            self.synced = self._syncing.result()
+            self._syncing.result()
         self._syncing = self._thread.submit(self._sync, self._size)
 
-    def _sync(self, size: int) -> int:
+    def _sync(self, size: int) -> None:
         os.fsync(self.raw.fileno())
-        return size
+        if not self.synced and sys.platform != "win32":  # its name, too, must be on the disk
+            folder = os.open(self._path.parent, os.O_RDONLY)
+            try:
+                os.fsync(folder)
+            finally:
+                os.close(folder)
+        self.synced = size
 
     def reserve(self, size: int) -> None:
         """Keep so many bytes of the disk free for the file's end, beside those for what waits.
@@ -105,7 +112,7 @@ class GrowingFile:
             self.push()
             if self._syncing is not None:
                 self._syncing.exception()
-            self.synced = self._sync(self._size)
+            self._sync(self._size)
         finally:
             self._thread.shutdown()
             self.raw.close()

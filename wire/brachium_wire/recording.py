@@ -94,6 +94,7 @@ class RecordingWriter:
         self._writer.start(profile=PROFILE)
         self._writer.add_metadata(PROFILE, dict(metadata or {}))
         self._file.push()
+        self._file.sync()
 
     @property
     def synced(self) -> int:
