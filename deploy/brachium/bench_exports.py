@@ -13,6 +13,7 @@ from brachium.export_readers.readers import READERS
 from brachium.version import version
 from brachium_fusion import solve
 from brachium_fusion.solve_table import tabled
+from brachium_nodes.sensors import Level
 from brachium_nodes.session import session_arrays
 from brachium_nodes.wearer import WearerSettings
 from brachium_viewer.export import formats
@@ -42,10 +43,10 @@ def measure(exercise: str = "drinking") -> dict[str, Any]:
         }
 
 
-def write_capture(folder: Path, exercise: str) -> None:
+def write_capture(folder: Path, exercise: str, level: Level = "ideal") -> None:
     """Write a capture folder of two arms with a gap in the left one's samples."""
     made = session_arrays(
-        WearerSettings(exercise=exercise, arms="both", level="ideal", rate_hz=RATE_HZ, seed=5), SECONDS
+        WearerSettings(exercise=exercise, arms="both", level=level, rate_hz=RATE_HZ, seed=5), SECONDS
     )
     t, segments = made.time_s, {}
     for name, sensor in made.sensors.items():

@@ -34,8 +34,12 @@ def _live(source: Path, subject: str | None) -> Table | None:
     with recording.read(source) as messages:
         subjects = from_recording.sort_out(messages)
     moving = {name: contents for name, contents in subjects.items() if contents.live}
-    if not moving or (subject is not None and subject not in moving):
+    if not moving:
         return None
+    if subject is not None and subject not in moving:
+        if subject in subjects and subjects[subject].samples:
+            return None
+        raise Usage(f"{source}: holds no subject {subject!r}; there are {', '.join(moving)}")
     if subject is None and len(moving) > 1:
         raise Usage(f"{source}: holds subjects {', '.join(moving)}; choose one with --subject")
     name = subject or next(iter(moving))
@@ -53,7 +57,7 @@ def _live(source: Path, subject: str | None) -> Table | None:
             "filter": chosen.filter,
             "mode": "live",
             "forward": skeletons[-1].forward,
-            "origin": _origin(skeletons),
+            "origin": origin_of(skeletons),
             "sides": [side for side in SIDES if any(s.side == side for s in skeletons)],
             "assumed": assumptions(skeletons),
             "subject": name,
@@ -63,7 +67,7 @@ def _live(source: Path, subject: str | None) -> Table | None:
     )
 
 
-def _origin(skeletons: list[Skeleton]) -> str:
+def origin_of(skeletons: list[Skeleton]) -> str:
     """Return where they come from; nothing that is in part emulated or played goes as worn."""
     found = {s.origin for s in skeletons}
     return next(origin for origin in ("emulated", "playback", "worn") if origin in found)

@@ -37,7 +37,8 @@ def between(table: Table, from_s: float | None, until_s: float | None) -> Table:
     kept = (since >= (from_s or 0.0) - 1e-9) & (since < (np.inf if until_s is None else until_s) - 1e-9)
     if not kept.any():
         length = f"{since[-1]:.3g} s" if len(since) else "no row"
-        raise TableError(f"there is nothing from {from_s or 0:g} to {until_s} s: the motion has {length}")
+        end = "on" if until_s is None else f"to {until_s:g} s"
+        raise TableError(f"there is nothing from {from_s or 0:g} s {end}: the motion has {length}")
     return Table({name: values[kept] for name, values in table.columns.items()}, table.units, table.metadata)
 
 

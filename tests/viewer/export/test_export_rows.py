@@ -1,0 +1,83 @@
+"""Cutting, choosing and even grids: laws, with no file."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation, Slerp
+
+from brachium_viewer.export import rows
+from brachium_viewer.export.formats import own_rate_hz
+from brachium_wire.table import Table, TableError
+
+
+def moving(time_s: np.ndarray) -> Table:
+    turns = Rotation.from_rotvec(np.stack([np.sin(time_s), 0.3 * time_s, np.cos(time_s)], axis=1))
+    q = turns.as_quat(scalar_first=True)
+    columns = {"time": time_s, "elbow_flexion": 90.0 * np.sin(time_s)}
+    columns |= {f"forearm_r_q{p}": q[:, i] for i, p in enumerate("wxyz")}
+    columns["quality_forearm_r"] = np.where(time_s < 1.0, "good", "held")
+    return Table(columns, {"time": "s", "elbow_flexion": "deg"}, {"sides": ["right"]})
+
+
+@given(rate=st.sampled_from([20.0, 25.0, 30.0, 50.0, 60.0, 100.0]), start=st.floats(-5.0, 1e5))
+def test_an_even_table_at_its_own_rate_stays_as_it_is(rate: float, start: float):
+    table = moving(start + np.arange(40) / rate)
+    again = rows.evenly(table, own_rate_hz(table))
+    assert own_rate_hz(table) == rate
+    for name, values in table.columns.items():
+        if name != "time":
+            assert (again.columns[name] == values).all(), name
+    np.testing.assert_allclose(again.columns["time"], table.columns["time"], atol=1e-6)
+
+
+def test_another_rate_lies_between_the_neighbours_as_scipy_puts_it():
+    table = moving(np.arange(100) / 50.0)
+    again = rows.evenly(table, 30.0)
+    t = again.columns["time"]
+    np.testing.assert_allclose(np.diff(t), 1.0 / 30.0)
+    expected = np.interp(t, table.columns["time"], table.columns["elbow_flexion"])
+    np.testing.assert_allclose(again.columns["elbow_flexion"], expected, atol=1e-9)
+    q = np.stack([table.columns[f"forearm_r_q{p}"] for p in "wxyz"], axis=1)
+    turned = Slerp(table.columns["time"], Rotation.from_quat(q, scalar_first=True))(t)
+    ours = np.stack([again.columns[f"forearm_r_q{p}"] for p in "wxyz"], axis=1)
+    assert (turned.inv() * Rotation.from_quat(ours, scalar_first=True)).magnitude().max() < 1e-9
+
+
+def test_nothing_is_put_into_a_gap():
+    time_s = np.arange(100) / 50.0
+    table = moving(time_s[(time_s < 0.8) | (time_s >= 1.2)])
+    for rate in (50.0, 30.0, 100.0):
+        again = rows.evenly(table, rate)
+        t = again.columns["time"]
+        inside = (t > 0.78 + 1e-6) & (t < 1.2 - 1e-6)
+        for name in ("elbow_flexion", "forearm_r_qw", "forearm_r_qz"):
+            assert np.isnan(again.columns[name][inside]).all()
+            assert np.isfinite(again.columns[name][~inside]).all()
+        assert (again.columns["quality_forearm_r"][inside] == "").all()
+
+
+def test_a_number_beside_an_unknown_one_stays_and_nothing_comes_between():
+    table = moving(np.arange(20) / 10.0)
+    table.columns["elbow_flexion"][5] = np.nan
+    again = rows.evenly(table, 20.0).columns["elbow_flexion"]
+    assert np.flatnonzero(np.isnan(again)).tolist() == [9, 10, 11]
+
+
+def test_columns_are_chosen_by_group_name_and_pattern():
+    table = moving(np.arange(5) / 10.0)
+    for words, expected in (
+        (("clinical",), ["elbow_flexion"]),
+        (("segments",), [f"forearm_r_q{p}" for p in "wxyz"]),
+        (("elbow_*", "quality"), ["elbow_flexion", "quality_forearm_r"]),
+    ):
+        assert list(rows.chosen(table, words).columns) == ["time", *expected]
+    with pytest.raises(TableError, match="'knee' names nothing in it; give groups"):
+        rows.chosen(table, ("knee",))
+
+
+def test_a_span_counts_from_the_first_instant_and_an_empty_one_is_refused():
+    table = moving(7.0 + np.arange(100) / 50.0)
+    assert rows.between(table, 0.5, 1.0).columns["time"].tolist() == pytest.approx(np.arange(7.5, 8.0, 0.02))
+    with pytest.raises(TableError, match=r"nothing from 5 s on: the motion has 1\.98 s"):
+        rows.between(table, 5.0, None)
