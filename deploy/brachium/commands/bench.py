@@ -44,6 +44,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
         choices=["load", "mixing", "faults"],
         help="instead: what CAN sensors cost; whether their samples mix; what a machine hears of a fault",
     )
+    other.add_argument("--page", action="store_true", help="instead: how late the page draws; what it costs")
     other.add_argument("--recorder", action="store_true", help="instead: what a kill or a full disk costs")
     parser.add_argument("--kills", type=whole(1, 1000), default=20, help="of --recorder")
     parser.add_argument("--nodes", type=whole(1, 500), default=256, help="of --gateway")
@@ -55,7 +56,7 @@ def run(args: argparse.Namespace) -> int:
     """Measure, one network after the other."""
     if args.exports:
         return _exports(args)
-    parts = (args.gateway, args.clock, args.sensors, args.can, args.recorder)
+    parts = (args.gateway, args.clock, args.sensors, args.can, args.recorder, args.page)
     if any(parts) or args.hostile is not None:
         return _other(args)
     figures = measure(QUICK_WINDOW_S if args.quick else WINDOW_S, args.arms)
@@ -84,6 +85,10 @@ def _other(args: argparse.Namespace) -> int:
         from brachium import bench_gateway
 
         found = bench_gateway.measure(args.nodes, QUICK_WINDOW_S if args.quick else WINDOW_S)
+    elif args.page:
+        from brachium import bench_page
+
+        found = bench_page.measure(QUICK_WINDOW_S if args.quick else 2.0 * WINDOW_S)
     elif args.clock:
         from brachium import bench_clock
 

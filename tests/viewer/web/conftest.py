@@ -66,12 +66,17 @@ class Screen:
     def __init__(self, socket: aiohttp.ClientWebSocketResponse) -> None:
         self.socket = socket
         self.number = 0
+        self.last: dict[str, dict] = {}
 
     async def until(self, found: Callable[[dict], bool], timeout_s: float = 20.0) -> dict:
-        """Return the first message that fits."""
+        """Return the first message that fits; the last of each kind that was heard is looked at first."""
+        for message in self.last.values():
+            if found(message):
+                return message
         async with asyncio.timeout(timeout_s):
             while True:
                 message = json.loads((await self.socket.receive()).data)
+                self.last[message["kind"]] = message
                 if found(message):
                     return message
 

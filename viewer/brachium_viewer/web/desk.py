@@ -41,18 +41,15 @@ class Desk:
             asked = r.read(text)
             verb, number = str(asked.__struct_config__.tag), asked.id
             data = await self._do(asked)
-        except (r.BadRequest, Refused, marks.BadMark, keys.BadKey, ValueError) as error:
-            return {"kind": "answer", "id": number, "verb": verb, "ok": False, "reason": str(error)}
+        except r.BadRequest as error:
+            return _answer(error.id, error.verb, reason=str(error))
+        except ValueError as error:  # every part's own words on what cannot be
+            return _answer(number, verb, reason=str(error))
         except Exception as error:
             log.exception("doing %s", verb)
-            return {
-                "kind": "answer",
-                "id": number,
-                "verb": verb,
-                "ok": False,
-                "reason": f"failed inside: {' '.join(str(error).split())[:200]}; see the server's log",
-            }
-        return {"kind": "answer", "id": number, "verb": verb, "ok": True, "data": data}
+            line = " ".join(str(error).split())[:200] or type(error).__name__
+            return _answer(number, verb, reason=f"failed inside: {line}; see the server's log")
+        return _answer(number, verb, data=data)
 
     async def _do(self, asked: r.Any) -> Json:
         if isinstance(asked, r.Subject):
@@ -180,3 +177,8 @@ class Desk:
             return decode(reply, Answer)
         except WireError as error:
             raise Refused(f"the answer cannot be read: {error}") from None
+
+
+def _answer(number: int, verb: str, *, data: Json | None = None, reason: str = "") -> Json:
+    ok = data is not None
+    return {"kind": "answer", "id": number, "verb": verb, "ok": ok, "reason": reason, "data": data}

@@ -17,7 +17,11 @@ Words = Annotated[str, msgspec.Meta(max_length=500)]
 
 
 class BadRequest(ValueError):
-    """What cannot be asked: one line that says what was expected."""
+    """What cannot be asked: one line that says what was expected; `id` and `verb` as far as they can be read."""
+
+    def __init__(self, text: str, head: "Head") -> None:
+        super().__init__(text)
+        self.id, self.verb = head.id, head.verb
 
 
 class Request(msgspec.Struct, frozen=True, kw_only=True, tag_field="verb"):
@@ -116,6 +120,15 @@ Any = (
     | Subject
     | Report
 )
+
+
+class Head(msgspec.Struct, frozen=True, kw_only=True):
+    """What an answer needs of a request that is refused."""
+
+    id: int = 0
+    verb: str = ""
+
+
 _decoder: msgspec.json.Decoder[Any] = msgspec.json.Decoder(Any)
 
 
@@ -124,4 +137,11 @@ def read(text: str) -> Any:
     try:
         return _decoder.decode(text)
     except (msgspec.DecodeError, UnicodeEncodeError) as error:
-        raise BadRequest(f"this cannot be asked: {error}") from None
+        raise BadRequest(f"this cannot be asked: {error}", _head(text)) from None
+
+
+def _head(text: str) -> Head:
+    try:
+        return msgspec.json.decode(text, type=Head)
+    except (msgspec.DecodeError, UnicodeEncodeError):
+        return Head()

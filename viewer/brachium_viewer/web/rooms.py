@@ -3,6 +3,7 @@
 import asyncio
 import contextlib
 import logging
+import socket
 import time
 from collections.abc import Awaitable, Callable
 from pathlib import Path
@@ -146,40 +147,49 @@ class Rooms:
             raise web.HTTPForbidden(reason="not from one of our pages")
         if len(self._screens) >= SCREENS:
             raise web.HTTPServiceUnavailable(reason=f"{SCREENS} screens watch already")
-        socket = web.WebSocketResponse(
+        screen = web.WebSocketResponse(
             heartbeat=HEARTBEAT_S, compress=False, max_msg_size=MAX_BYTES, writer_limit=1
         )
-        await socket.prepare(request)
-        if request.transport is not None:
-            request.transport.set_write_buffer_limits(high=BUFFER_BYTES)
-        self._screens.add(socket)
+        await screen.prepare(request)
+        _hold_little(request.transport)
+        self._screens.add(screen)
         seat = self._greet()
-        sending = asyncio.create_task(_send(socket, seat))
+        sending = asyncio.create_task(_send(screen, seat))
         asking: set[asyncio.Task[None]] = set()
         try:
-            async for message in socket:
+            async for message in screen:
                 if message.type is WSMsgType.TEXT and len(asking) < 8:
                     task = asyncio.create_task(_awaited(self._asked(seat, message.data)))
                     asking.add(task)
                     task.add_done_callback(asking.discard)
         finally:
             self._leave(seat)
-            self._screens.discard(socket)
+            self._screens.discard(screen)
             for task in (sending, *asking):
                 task.cancel()
-        return socket
+        return screen
 
     async def _close(self, app: web.Application) -> None:
         del app
-        for socket in list(self._screens):
-            await socket.close(code=1001, message=b"the server ends")
+        for screen in list(self._screens):
+            await screen.close(code=1001, message=b"the server ends")
 
 
-async def _send(socket: web.WebSocketResponse, seat: Seat) -> None:
+def _hold_little(transport: asyncio.Transport | None) -> None:
+    """Let little wait in a connection, in this process and in the system."""
+    if transport is None:
+        return
+    transport.set_write_buffer_limits(high=BUFFER_BYTES)
+    plain = transport.get_extra_info("socket")
+    if plain is not None:
+        plain.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, BUFFER_BYTES)
+
+
+async def _send(screen: web.WebSocketResponse, seat: Seat) -> None:
     with contextlib.suppress(ConnectionError):
         while True:
             for text in await seat.take():
-                await socket.send_str(text)
+                await screen.send_str(text)
 
 
 async def _awaited(asked: Awaitable[None]) -> None:

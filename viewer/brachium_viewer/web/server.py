@@ -88,6 +88,7 @@ class _Server:
         self._sessions = SessionDesk(settings.sessions, settings.endpoint, settings.room, self._id)
         self._desk = Desk(bus, self._state, self._sessions, self._clock)
         self._seats: set[Seat] = set()
+        self._left = 0
         self._state_text = ""
         self._state_due = 0.0
         self._tokens: list[tuple[str, bool]] = []
@@ -96,7 +97,7 @@ class _Server:
             bind=settings.bind,
             door=door,
             greet=self._greet,
-            leave=self._seats.discard,
+            leave=self._leave,
             asked=self._asked,
             report=self._sessions.report_file,
         )
@@ -113,6 +114,7 @@ class _Server:
                 self._take(inboxes)
                 self._tell()
                 heart.counts["screens"] = len(self._seats)
+                heart.counts["frames_skipped"] = self._left + sum(seat.skipped for seat in self._seats)
                 heart.drops["overflow"] = sum(inbox.dropped for inbox in inboxes)
                 heart.beat()
                 due = max(due + 1.0 / RATE_HZ, time.monotonic())
@@ -189,6 +191,10 @@ class _Server:
         seat.put_state(self._state_text or self._state_now(self._clock.now_ns()))
         self._seats.add(seat)
         return seat
+
+    def _leave(self, seat: Seat) -> None:
+        self._left += seat.skipped
+        self._seats.discard(seat)
 
     async def _asked(self, seat: Seat, text: str) -> None:
         seat.put_answer(_text(await self._desk.do(text)))

@@ -107,7 +107,9 @@ $("start").addEventListener("click", async () => {
   const answer = await busy($("start"), () => link.ask("exercise", { ...plan.words, set }));
   numbers.ended = null;
   tell($("action-said"), answer);
-  if (answer.ok) $("stop").focus();
+  if (!answer.ok) return;
+  $("stop").focus();
+  scrollTo({ top: 0 }); // the picture and the numbers are what is looked at now
 });
 
 $("stop").addEventListener("click", async () => {
