@@ -73,7 +73,9 @@ def motion(table: Table, about: dict[str, Any]) -> Motion:
     sides = sides_of(table)
     segments = {s: _block(table, [f"{s}_q{part}" for part in PARTS]) for s in SEGMENTS}
     known: dict[str, Floats] = {s: block for s, block in segments.items() if block is not None}
-    arms = {side: _arm(table, side, suffix(side) if len(sides) > 1 else "", known) for side in sides}
+    arms: dict[Side, ArmPath] = {
+        side: _arm(table, side, suffix(side) if len(sides) > 1 else "", known) for side in sides
+    }
     thorax = known.get("sternum", np.full((n, 4), np.nan)).copy()
     for side, arm in arms.items():
         upper_arm = known.get(arm_segments(side)[0])
