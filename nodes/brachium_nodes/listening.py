@@ -21,5 +21,5 @@ def listening_address(bind: str) -> str:
 def why_not(error: OSError, address: str, port: int) -> str:
     """Return why an address and port cannot be had."""
     if "in use" in str(error):
-        return f"port {port} of {address} is in use: another gateway is running, or choose another --port"
-    return f"the gateway cannot listen at {address} port {port}: {error.strerror or error}"
+        return f"port {port} of {address} is in use: end what listens there, or choose another --port"
+    return f"nothing can listen at {address} port {port}: {error.strerror or error}"

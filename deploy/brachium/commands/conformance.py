@@ -5,6 +5,7 @@ brachium conformance --id esp-3f21 -- ./my_node {host} {port} {id} {token}
 
 import argparse
 import secrets
+import signal
 from pathlib import Path
 
 from brachium.option_types import port
@@ -31,6 +32,7 @@ def run(args: argparse.Namespace) -> int:
 
     if not args.command[0].strip():
         raise Usage("give the command that starts a node after --, as in -- ./my_node {host} {port}")
+    signal.signal(signal.SIGTERM, signal.default_int_handler)  # ends what was started, as Ctrl-C does
     trial = Trial(
         command=tuple(args.command),
         node=args.id,

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from brachium.option_types import probability, real, seed, whole
-from brachium.shell import add_json, add_network, print_json, stop_on_signals
+from brachium.shell import Usage, add_json, add_network, print_json, stop_on_signals
 from brachium.way_in import GATEWAY, add_way_in, node_table, read_token
 
 if TYPE_CHECKING:
@@ -59,7 +59,7 @@ def add_wearer(parser: argparse.ArgumentParser) -> None:
         default="elbow-flexion",
         help="what is done; an unknown name lists all; sensor-calibration: worn by nobody, to be calibrated",
     )
-    parser.add_argument("--routine", default="", help="what is done first; an unknown name lists all")
+    parser.add_argument("--routine", help="what is done first; an unknown name lists all")
     parser.add_argument("--arms", default="right", help="right, left or both")
     parser.add_argument(
         "--level", default="typical", help="sensor errors: exact (none), ideal, typical or patient"
@@ -104,10 +104,14 @@ def settings(args: argparse.Namespace, token: str) -> "EmulateSettings":
     """Return what the options ask for; raises ValueError for what cannot be emulated."""
     from brachium_nodes.emulate import EmulateSettings
     from brachium_nodes.emulate_bench import EXERCISES
+    from brachium_nodes.exercises import EXERCISES as WORN
     from brachium_nodes.link import FaultSettings
     from brachium_nodes.shimmer.emulated_port import ShimmerTwin
     from brachium_nodes.wearer import WearerSettings
 
+    if args.exercise not in (*WORN, *EXERCISES):
+        known = ", ".join((*WORN, *EXERCISES))
+        raise Usage(f"exercise {args.exercise!r} is not known; choose one of {known}")
     return EmulateSettings(
         endpoint=args.endpoint,
         room=args.room,
@@ -124,7 +128,7 @@ def settings(args: argparse.Namespace, token: str) -> "EmulateSettings":
         flash=args.flash,
         wearer=WearerSettings(
             exercise="elbow-flexion" if args.exercise in EXERCISES else args.exercise,
-            routine=args.routine,
+            routine=args.routine or "",
             arms=args.arms,
             level=args.level,
             seed=args.seed,

@@ -50,7 +50,7 @@ def run(args: argparse.Namespace) -> int:
     if args.runtime:
         return _run_times(args)
     if args.folder is not None:
-        return _measure(args, args.folder)
+        return _measure(args, args.folder.resolve())  # the boards run in folders of their own
     with TemporaryDirectory() as folder:
         return _measure(args, Path(folder))
 

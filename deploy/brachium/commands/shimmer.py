@@ -17,7 +17,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
         "--subject", required=True, help="whom it is worn by; p01.ref: a second set of sensors on p01"
     )
     parser.add_argument("--segment", required=True, help="where it is worn, as forearm_r")
-    parser.add_argument("--id", default="", help="its name (default: shimmer-SUBJECT-SEGMENT)")
+    parser.add_argument("--id", help="its name (default: shimmer-SUBJECT-SEGMENT)")
     parser.add_argument("--rate", type=real(1.0, 512.0), default=51.2, metavar="HZ", help="samples a second")
     parser.add_argument(
         "--accelerometer", default="wide-range", choices=["wide-range", "low-noise"], help="low-noise: 2 g"
@@ -50,7 +50,7 @@ def run(args: argparse.Namespace) -> int:
         segment=args.segment,
         endpoint=args.endpoint,
         room=args.room,
-        id=args.id,
+        id=args.id or "",
         mounting=None if args.mounting is None else _quaternion(args.mounting),
         origin=args.origin,
         wish=Wish(
