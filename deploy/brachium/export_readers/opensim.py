@@ -66,7 +66,7 @@ def read_mot(path: Path) -> Found:
 def _our_angles(model: dict[str, Floats]) -> dict[str, Floats]:
     """Return the model's coordinates (n,) deg as our angles: its wrist bends first and deviates then."""
     found: dict[str, Floats] = {}
-    for end in ("r", "l"):
+    for end in (end for end in ("r", "l") if f"arm_flex_{end}" in model):
         names = {
             "arm_flex": "theta1",
             "arm_add": "theta2",

@@ -9,7 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from brachium_body.kinematics import JOINTS
+from brachium.export_readers.readers import READERS
+from brachium_body import rotation
+from brachium_body.kinematics import JOINTS, TRUNK_FROM_THORAX
+from brachium_body.segments import SEGMENTS
 from brachium_viewer.export import formats
 from brachium_viewer.export.about import carried, sidecar
 from brachium_viewer.export.formats import FORMATS, Wish
@@ -195,3 +198,57 @@ def test_a_missing_extra_is_named(result: Table, tmp_path: Path, monkeypatch: py
     monkeypatch.setattr(formats, "find_spec", lambda _: None)
     with pytest.raises(MissingExtra, match=r"needs the package ezc3d: pip install 'brachium\[export\]'"):
         export(result, tmp_path, "c3d")
+
+
+def one_arm(result: Table, end: str) -> Table:
+    """Return one arm's table as `solve` writes it: no endings but of segments."""
+    other = "_l" if end == "_r" else "_r"
+    columns = {}
+    for name, values in result.columns.items():
+        if name.endswith(other) or (f"{other}_" in name and "_q" in name):
+            continue
+        segment = name.split("_q")[0] in SEGMENTS or name.removeprefix("quality_") in SEGMENTS
+        segment = segment or "_sensor_q" in name
+        columns[name if segment else name.removesuffix(end)] = values
+    side = {"_r": "right", "_l": "left"}[end]
+    return Table(columns, {}, result.metadata | {"sides": [side]})
+
+
+@pytest.mark.parametrize("end", ["_r", "_l"])
+@pytest.mark.parametrize("to", ["sto", "mot", "trc", "c3d", "bvh"])
+def test_one_arm_stands_alone_as_it_stands_beside_the_other(to: str, end: str, result: Table, tmp_path: Path):
+    alone = READERS[to](export(one_arm(result, end), tmp_path, to))
+    (tmp_path / "both").mkdir()
+    both = READERS[to](export(result, tmp_path / "both", to))
+    for found, of_both in ((alone.angles_deg, both.angles_deg), (alone.places_mm, both.places_mm)):
+        assert set(found) == {name for name in of_both if name.endswith(end)}
+        for name, values in found.items():
+            np.testing.assert_allclose(values, of_both[name], atol=1e-3, err_msg=name)
+
+
+def test_whose_arm_a_table_of_before_holds_is_told_by_its_segments(result: Table, tmp_path: Path):
+    table = one_arm(result, "_l")
+    untold = Table(table.columns, {}, {n: v for n, v in table.metadata.items() if n != "sides"})
+    assert formats.prepared(untold, Wish(to="trc"), "test").about["sides"] == ["left"]
+    bare = Table({"time": np.arange(3.0), "elbow_flexion": np.zeros(3)}, {}, {})
+    with pytest.raises(TableError, match="no result of brachium solve: it names no time and no arm"):
+        export(bare, tmp_path, "csv")
+
+
+def test_a_leaning_trunk_turns_the_root_and_not_the_markers(result: Table, tmp_path: Path):
+    lean = rotation.about(2, np.radians(-20.0))  # thorax axes: Z to the right, so that the chest goes forward
+    n = len(result)
+    thorax = np.tile(rotation.multiply(TRUNK_FROM_THORAX, lean), (n, 1))
+    columns = result.columns | {f"sternum_q{p}": thorax[:, i] for i, p in enumerate("wxyz")}
+    upright = np.arange(n) < 10
+    for i, p in enumerate("wxyz"):
+        columns[f"sternum_q{p}"] = np.where(upright, TRUNK_FROM_THORAX[i], columns[f"sternum_q{p}"])
+    leaning = Table(columns, result.units, result.metadata)
+    text = export(leaning, tmp_path, "bvh").read_text()
+    rows = np.array(
+        [[float(x) for x in line.split()] for line in text.partition("Time:")[2].splitlines()[1:]]
+    )
+    np.testing.assert_allclose(rows[0, 3:6], 0.0, atol=1e-6)
+    np.testing.assert_allclose(rows[100, 3:6], [0.0, 20.0, 0.0], atol=1e-6)  # about X, to the left: forward
+    found, plain = (READERS["bvh"](tmp_path / "arm.bvh"), READERS["trc"](export(result, tmp_path, "trc")))
+    np.testing.assert_allclose(found.places_mm["wrist_r"], plain.places_mm["wrist_r"], atol=0.1)
