@@ -16,7 +16,7 @@ import msgspec
 
 from brachium_wire import codec, messages, plausible, samples
 from brachium_wire.messages import Message
-from brachium_wire.sensor_records import SensorProgress
+from brachium_wire.sensor_records import SensorProgress, WearFound, WearProgress
 from brachium_wire.topics import TOPICS
 
 HERE = Path(__file__).parent
@@ -240,7 +240,7 @@ def sections() -> dict[str, str]:
     for message in EXAMPLES:
         kind = type(message)
         out[tag_of(kind)] = f"{fields(kind)}\n\n{example(message)}"
-    for record in (messages.SensorCalibration, SensorProgress, messages.SegmentPose):
+    for record in (messages.SensorCalibration, SensorProgress, WearProgress, WearFound, messages.SegmentPose):
         out[record.__name__] = fields(record)
     return out
 

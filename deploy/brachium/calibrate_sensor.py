@@ -8,12 +8,13 @@ from typing import Any
 import msgspec
 
 from brachium import sensor_picture
+from brachium.asking import asked
 from brachium.shell import Failed, print_json
 from brachium_fusion import sensor_guide
 from brachium_wire import keys
 from brachium_wire.bus import Bus, Inbox
-from brachium_wire.codec import WireError, decode, decode_topic, encode
-from brachium_wire.messages import Answer, Calibration, Command, Info
+from brachium_wire.codec import WireError, decode_topic
+from brachium_wire.messages import Answer, Calibration, Info
 from brachium_wire.sensor_records import SensorProgress
 
 LONGEST_S = sensor_guide.LONGEST_S + 60.0
@@ -55,23 +56,15 @@ class SensorCalibrationRun:
 
     def _asked(self, arguments: dict[str, Any], screen: "_Screen") -> Answer | None:
         """Ask, and show progress until the answer comes."""
-        answered = threading.Event()
-        found: list[bytes | None] = []
 
-        def ask() -> None:
-            question = encode(Command(arguments=arguments))
-            found.append(self._bus.ask(self._command, question, timeout_s=LONGEST_S))
-            answered.set()
+        def show(news: Calibration) -> None:
+            progress = news.sensor
+            if progress is not None and progress.segment == self._segment:
+                screen.show(progress)
 
-        threading.Thread(target=ask, daemon=True).start()
-        while not answered.is_set() and not self._stop.is_set():
-            for _, payload in self._news.drain():
-                progress = decode(payload, Calibration).sensor
-                if progress is not None and progress.segment == self._segment:
-                    screen.show(progress)
-            self._news.wait(LOOK_S)
+        answer = asked(self._bus, self._command, arguments, self._news, show, self._stop, LONGEST_S)
         screen.end()
-        return decode(found[0], Answer) if found and found[0] is not None else None
+        return answer
 
     def _kept(self, data: dict[str, Any]) -> str:
         """Return who keeps what was found: the node, its gateway, or nobody that said so in time."""

@@ -18,6 +18,7 @@ from brachium_fusion.pipeline import Pipeline
 from brachium_fusion.pose_watch import STILL_S
 from brachium_fusion.sensor_desk import SensorDesk
 from brachium_fusion.settings import Change, Settings
+from brachium_fusion.wear_desk import WearDesk
 from brachium_wire import keys
 from brachium_wire.bus import DEFAULT_ENDPOINT, Bus, Inbox
 from brachium_wire.codec import Drop, WireError, decode, decode_topic, encode
@@ -80,9 +81,10 @@ class FusionService:
         kept = None if settings.keep is None else Kept(settings.keep)
         self._desk = CalibrationDesk(self._pipeline, settings.room, kept)
         self._sensors = SensorDesk(self._pipeline)
+        self._wear = WearDesk(self._pipeline, settings.room)
         self._calibrations: dict[str, Calibration] = {}
         """What was last said of how each subject's sensors are worn."""
-        for verb in ("calibrate", "zero", "record"):
+        for verb in ("calibrate", "zero", "record", "wear-check"):
             bus.serve_later(keys.commands(settings.room, verb), self._on_command)
         self._heard(bus.fetch(keys.subjects(settings.room, "imu/*/info")))
         for subject in sorted(self._pipeline.subjects):
@@ -106,6 +108,7 @@ class FusionService:
         self._heard(self._inbox.drain())
         for subject, found in self._desk.changes():
             self._apply(subject, "align", found)
+        self._wear.turn()
         self._publish()
         self._tell_settings()
         with self._lock:
@@ -120,6 +123,7 @@ class FusionService:
         """Tell the last health and who still waits for an answer."""
         self._desk.close()
         self._sensors.close()
+        self._wear.close()
         self._beat(now=True)
         self._heart.end()
 
@@ -133,6 +137,7 @@ class FusionService:
         self._pipeline.feed_all(parsed)
         for place, payload in parsed:
             self._sensors.see(place, payload)
+            self._wear.see(place, payload)
 
     def _heard_session(self, key: str, payload: bytes) -> None:
         try:
@@ -175,12 +180,14 @@ class FusionService:
                 log.warning("%s: %s", subject, warning)
             if calibration.state in ("done", "refused"):
                 self._desk.finished(subject, calibration)
-        told, self._sensors.news = self._sensors.news, set()
+        told = self._sensors.news | self._wear.news
+        self._sensors.news, self._wear.news = set(), set()
         for subject in told:
             self._tell_calibration(subject)
 
     def _tell_calibration(self, subject: str) -> None:
         whole = self._sensors.complete(subject, self._calibrations.get(subject))
+        whole = self._wear.complete(subject, whole)
         self._bus.retain(keys.calibration(self._room, subject), encode(whole))
 
     # -- commands ----------------------------------------------------------------------------------------
@@ -202,6 +209,8 @@ class FusionService:
                 raise ValueError(f"no sensor of subject {key.subject!r} has been heard yet")
             if key.detail == "calibrate" and "sensor" in command.arguments:
                 self._sensors.begin(key.subject, command.arguments, reply)
+            elif key.detail == "wear-check":
+                self._wear.begin(key.subject, command.arguments, reply)
             elif key.detail == "record":
                 snapshot = self._pipeline.snapshot(key.subject)
                 reply(encode(Answer(ok=True, data={"snapshot": snapshot})))

@@ -10,21 +10,21 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from brachium import wear_guide
 from brachium.__main__ import main
 from brachium.commands.wear_check import SPANS
-from brachium.wear_guide import STEPS, Guide
-from brachium.wear_passes import CannotTell, Heard, Plan, Sensor, examine, of_capture, wear_pass
 from brachium_body.segments import Segment, Side, arm_segments
+from brachium_fusion.service import FuseSettings, FusionService
 from brachium_fusion.uniform import Series
+from brachium_fusion.wear_guide import LISTENING, STEPS
+from brachium_fusion.wear_passes import Heard, Plan, Sensor, examine, of_capture, wear_pass
 from brachium_nodes.session import SessionArrays, session_arrays
 from brachium_nodes.wearer import WearerSettings
 from brachium_nodes.wearing import Turn, Wearing
 from brachium_wire import capture, keys
 from brachium_wire.bus import Bus
 from brachium_wire.capture_settings import CaptureSettings
-from brachium_wire.codec import encode
-from brachium_wire.messages import Info, Quaternion, SensorCalibration
+from brachium_wire.codec import decode, encode
+from brachium_wire.messages import Calibration, Info, Quaternion, SensorCalibration
 from brachium_wire.recording import Recorded, RecordingWriter
 from brachium_wire.samples import write_samples
 
@@ -216,12 +216,12 @@ def test_bad_input_is_usage(
 def heard_all(made: SessionArrays, without: range = range(0), **more: object) -> Heard:
     heard = Heard()
     for s in RIGHT:
-        heard.take(keys.info(ROOM, SUBJECT, s), info_of(made, s, **more))
+        heard.take(keys.Key(ROOM, SUBJECT, "info", s), info_of(made, s, **more))
         for first in reversed(range(0, len(made.time_s), 5)):  # a batch that is late is in its place
             if first not in without:
                 one = batch(made, s, first, min(first + 5, len(made.time_s)))
-                heard.take(keys.imu(ROOM, SUBJECT, s), one)
-                heard.take(keys.imu(ROOM, SUBJECT, s), one)  # what comes twice counts once
+                heard.take(keys.Key(ROOM, SUBJECT, "imu", s), one)
+                heard.take(keys.Key(ROOM, SUBJECT, "imu", s), one)  # what comes twice counts once
     return heard
 
 
@@ -280,8 +280,8 @@ def test_a_node_that_cannot_be_checked_is_left_out_by_name() -> None:
 
 def test_what_breaks_the_contract_is_counted() -> None:
     heard = Heard()
-    heard.take(keys.imu(ROOM, SUBJECT, "hand_r"), b"\xc1")
-    heard.take("elsewhere", b"")
+    heard.take(keys.Key(ROOM, SUBJECT, "imu", "hand_r"), b"\xc1")
+    heard.take(keys.Key(ROOM, SUBJECT, "info", "hand_r"), b"\xc1")
     assert heard.drops.total() == 2
     assert heard.sensors() == {}
 
@@ -329,6 +329,31 @@ class Wearer:
         self._now_ns += round(count * 1e9 / RATE_HZ)
 
 
+class Fusion:
+    """The service in a thread, until the end of the `with` block."""
+
+    def __init__(self, endpoint: str, room: str) -> None:
+        self._settings, self._stop = FuseSettings(endpoint=endpoint, room=room), threading.Event()
+        self._ready, self._thread = threading.Event(), threading.Thread(target=self._run)
+
+    def __enter__(self) -> None:
+        self._thread.start()
+        assert self._ready.wait(10)
+
+    def __exit__(self, *_: object) -> None:
+        self._stop.set()
+        self._thread.join(10)
+        assert not self._thread.is_alive()
+
+    def _run(self) -> None:
+        with Bus.open(self._settings.endpoint, stop=self._stop) as bus:
+            service = FusionService(bus, self._settings)
+            self._ready.set()
+            while not self._stop.wait(service.pause_s()):
+                service.turn()
+            service.close()
+
+
 @pytest.mark.network
 @pytest.mark.parametrize("wrong", [False, True])
 def test_a_wearer_is_led_and_told(
@@ -337,32 +362,40 @@ def test_a_wearer_is_led_and_told(
     with Bus.open(endpoint) as bus:
         wearer = Wearer(bus, session(wrong))
         monkeypatch.setattr("brachium.commands.wear_check._say", wearer.hears)
-        code = main(["wear-check", "--endpoint", endpoint, "--room", ROOM, "--json"])
+        news = bus.subscribe(keys.calibration(ROOM, SUBJECT))
+        with Fusion(endpoint, ROOM):
+            code = main(["wear-check", "--endpoint", endpoint, "--room", ROOM, "--json"])
         for s in RIGHT:
             bus.forget(keys.info(ROOM, SUBJECT, s))
+        bus.forget(keys.calibration(ROOM, SUBJECT))
+        last = [decode(payload, Calibration).wear for _, payload in news.drain()][-1]
     assert code == (1 if wrong else 0)
-    assert told(capsys.readouterr().out) == (AS_WRONG if wrong else {s: (s, "") for s in RIGHT})
+    expected = AS_WRONG if wrong else {s: (s, "") for s in RIGHT}
+    assert told(capsys.readouterr().out) == expected
     instructions = [text for text in wearer.said if not text.startswith(" ")]
-    assert instructions == ["listening for the sensors", *(s.words.format(side="right") for s in STEPS)]
+    assert instructions == [LISTENING, *(s.words.format(side="right") for s in STEPS)]
+    assert last is not None
+    assert (last.state, last.fine) == ("done", not wrong)
+    assert {f.segment: (f.seat, f.turn) for f in last.findings} == expected
 
 
 @pytest.mark.network
 def test_silence_is_a_reason_and_no_wait_without_end(
     endpoint: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(wear_guide, "LISTEN_S", 0.2)
-    monkeypatch.setattr(wear_guide, "STALLED_S", 0.2)
-    assert main(["wear-check", "--endpoint", endpoint, "--room", "empty"]) == 1
-    assert "no samples of subject 'p01' in room 'empty'" in capsys.readouterr().err
-    with Bus.open(endpoint) as bus:
-        made, room = session(), "breaks-off"
-
-        def say(text: str) -> None:
-            if text.startswith("listening"):
-                bus.retain(keys.info(room, SUBJECT, "hand_r"), info_of(made, "hand_r"))
-                bus.put(keys.imu(room, SUBJECT, "hand_r"), batch(made, "hand_r", 0, 5))
-
-        with pytest.raises(CannotTell, match="most nodes were silent"):
-            Guide(bus, room, SUBJECT, say, threading.Event()).run([])
-        with pytest.raises(CannotTell, match="on the left arm sends samples"):
-            Guide(bus, room, SUBJECT, say, threading.Event()).run(["left"])
+    monkeypatch.setattr("brachium_fusion.wear_guide.LISTEN_S", 0.2)
+    words = ["wear-check", "--endpoint", endpoint, "--room", "quiet"]
+    assert main(words) == 1
+    assert "fusion does not answer" in capsys.readouterr().err
+    with Bus.open(endpoint) as bus, Fusion(endpoint, "quiet"):
+        assert main(words) == 1
+        assert "no sensor of subject 'p01' has been heard yet" in capsys.readouterr().err
+        bus.retain(keys.info("quiet", SUBJECT, "hand_r"), info_of(session(), "hand_r"))
+        said = ""
+        for _ in range(100):  # until fusion has heard of the node
+            assert main(words) == 1
+            said = capsys.readouterr().err
+            if "has been heard yet" not in said:
+                break
+        bus.forget(keys.info("quiet", SUBJECT, "hand_r"))
+    assert "nothing can be said: no samples of subject 'p01' in room 'quiet' come" in said

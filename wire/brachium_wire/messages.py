@@ -8,15 +8,13 @@ from typing import Any, Literal
 import msgspec
 
 from brachium_body.segments import Side
-from brachium_wire.sensor_records import CalibrationState as CalibrationState
-from brachium_wire.sensor_records import Keeper, SensorProgress
+from brachium_wire.sensor_records import CalibrationState, Keeper, SensorProgress, WearProgress
 from brachium_wire.sensor_records import SensorCalibration as SensorCalibration
 from brachium_wire.sensor_records import Vector as Vector
 
 Origin = Literal["worn", "emulated", "playback"]
 Quality = Literal["good", "held", "missing", "disturbed", "uncalibrated", "heading_assumed", "assumed"]
 Forward = Literal["sternum", "elbow", "facing", "mounting", "none"]
-
 Quaternion = tuple[float, float, float, float]
 
 
@@ -81,7 +79,7 @@ class Info(Message, frozen=True, kw_only=True, tag="info/1"):
     orientation_only: bool = msgspec.field(name="ori", default=False)
     """Whether batches carry `quat` and nothing else."""
     heading_free: bool = msgspec.field(name="free", default=False)
-    """Whether its orientations have a heading of their own, which drifts: there is no magnetometer behind them."""
+    """Whether its orientations have a heading of their own, which drifts: no magnetometer is behind them."""
 
 
 class Status(Message, frozen=True, kw_only=True, tag="status/1"):
@@ -196,6 +194,8 @@ class Calibration(Message, frozen=True, kw_only=True, tag="calibration/1"):
     """The sensor that is being calibrated by itself, or was last."""
     sensors: dict[str, SensorCalibration] = msgspec.field(default_factory=dict)
     """Sensor calibrations found here, by node: what gateways bring to the nodes."""
+    wear: WearProgress | None = None
+    """The check of who sits where that runs, or ran last."""
 
 
 class Session(Message, frozen=True, kw_only=True, tag="session/1"):

@@ -1,4 +1,7 @@
-"""What is known of one sensor's own errors, and how far finding them has come: parts of messages."""
+"""What is known of one sensor's own errors, and of where sensors sit, and how far finding it has come.
+
+Parts of messages.
+"""
 
 from typing import Literal
 
@@ -7,6 +10,8 @@ import msgspec
 Vector = tuple[float, float, float]
 CalibrationState = Literal["none", "waiting", "running", "done", "refused"]
 SensorStep = Literal["rest", "faces", "turn"]
+WearStep = Literal["listen", "ready", "hang", "raise", "bend"]
+WearTurn = Literal["", "upside-down", "inside-out", "both"]
 Keeper = Literal["", "node", "gateway"]
 
 
@@ -60,3 +65,44 @@ class SensorProgress(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=Tr
     """How well it went, by name with unit; `_before` is without this calibration."""
     refused: dict[str, str] = msgspec.field(default_factory=dict)
     """Steps that found nothing, and why: one line that says what to do."""
+
+
+class WearFound(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
+    """Where one sensor sits, and what to change."""
+
+    segment: str
+    """What its name says."""
+    seat: str | None = None
+    """Where it sits; not there, or null in an answer, if it cannot be told."""
+    turn: WearTurn = ""
+    """How it is turned on the skin; empty where it is as it should be."""
+    fine: bool
+    """Whether there is nothing to change."""
+    text: str
+    """What is so and what to change: one line for people."""
+
+
+class WearProgress(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
+    """How far the check of who sits where has come; what it found stands in `findings` once it is over."""
+
+    state: CalibrationState
+    """running, and in the end done or refused."""
+    step: WearStep = "listen"
+    """What is to be done now: nothing yet, let both arms hang, hang still, raise the arm sideways and let it
+    down, bend the elbow and straighten it."""
+    side: str = ""
+    """Which arm does it: right or left; empty while nothing is to be done."""
+    sides: list[str] = msgspec.field(default_factory=list)
+    """All arms, in order."""
+    reason: str = ""
+    """What to do now, or why it was refused: one line."""
+    left_s: int = 0
+    """How much longer this is to be done, whole s."""
+    fine: bool = False
+    """Whether every sensor was checked and found as it should be."""
+    findings: list[WearFound] = msgspec.field(default_factory=list)
+    """One for each sensor that was checked."""
+    left_out: dict[str, str] = msgspec.field(default_factory=dict)
+    """Sensors that were not checked, and why: `sends ...`, `is silent ...`."""
+    assumed: list[str] = msgspec.field(default_factory=list)
+    """Sensors of which nobody told how they should be worn: their axes were taken for the segment's."""

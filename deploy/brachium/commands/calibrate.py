@@ -124,26 +124,18 @@ def _asked(
     bus: "Bus", key: str, arguments: dict[str, Any], news: "Inbox", stop: threading.Event, quiet: bool
 ) -> "Answer | None":
     """Ask, and show progress until the answer comes."""
-    from brachium_wire.codec import decode, encode
-    from brachium_wire.messages import Answer, Calibration, Command
+    from brachium.asking import asked
 
-    answered = threading.Event()
-    found: list[bytes | None] = []
-
-    def ask() -> None:
-        found.append(bus.ask(key, encode(Command(arguments=arguments)), timeout_s=LONGEST_S))
-        answered.set()
-
-    threading.Thread(target=ask, daemon=True).start()
     said = ""
-    while not answered.is_set() and not stop.is_set():
-        for _, payload in news.drain():
-            told = _line(decode(payload, Calibration))
-            if told != said and told and not quiet:
-                print(told, flush=True)
-            said = told
-        news.wait(0.1)
-    return decode(found[0], Answer) if found and found[0] is not None else None
+
+    def show(progress: "Calibration") -> None:
+        nonlocal said
+        told = _line(progress)
+        if told != said and told and not quiet:
+            print(told, flush=True)
+        said = told
+
+    return asked(bus, key, arguments, news, show, stop, LONGEST_S)
 
 
 def _line(news: "Calibration") -> str:

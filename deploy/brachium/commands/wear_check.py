@@ -11,16 +11,18 @@ brachium wear-check --subject p01
 import argparse
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from brachium.option_types import span_s
 from brachium.shell import Failed, Usage, add_json, add_network, print_json, stop_on_signals
 
 if TYPE_CHECKING:
-    from brachium.wear_passes import Outcome, Plan, Sensors
-    from brachium_body.segments import Side
+    from brachium_fusion.wear_passes import Plan, Sensors
+    from brachium_wire.messages import Calibration
 
 SPANS = ("hang", "raise", "bend")
+EXAMINED_S = 10.0
+"""What was heard is examined within this, on a busy machine."""
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
@@ -46,47 +48,78 @@ def configure(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Check, and tell what to change."""
-    from brachium.wear_passes import CannotTell, Outcome, examine
-    from brachium_fusion.wear_check import WearCheck
-
     given = [args.moved, *(getattr(args, name) for name in SPANS)]
     if args.input is None and any(given):
         raise Usage("--moved, --hang, --raise and --bend belong to a recording or a capture folder: name it")
     if args.input is not None and args.side:
         raise Usage("--side belongs to a running network; say --moved for a recording or a capture folder")
-    try:
-        outcome = examine(*(_live(args) if args.input is None else _recorded(args)))
-    except CannotTell as refusal:
-        outcome = Outcome(WearCheck(findings=(), refused=str(refusal)), {}, ())
+    found = _live(args) if args.input is None else _recorded(args)
     if args.json:
-        print_json(_figures(outcome))
-    elif words := _words(outcome):
+        print_json(found)
+    elif words := _words(found):
         print(words)
-    if outcome.check.refused:
-        raise Failed(f"nothing can be said: {outcome.check.refused}")
-    return 0 if outcome.fine else 1
+    if found["refused"]:
+        raise Failed(f"nothing can be said: {found['refused']}")
+    return 0 if found["fine"] else 1
 
 
-def _live(args: argparse.Namespace) -> "tuple[Sensors, list[Plan]]":
-    from brachium.wear_guide import Guide
+def _live(args: argparse.Namespace) -> dict[str, Any]:
+    """Ask fusion, which leads the wearer; say what it says."""
+    from brachium.asking import asked
+    from brachium_fusion.wear_guide import LONGEST_S
+    from brachium_wire import keys
     from brachium_wire.bus import Bus
 
-    asked: list[Side] = []
-    if args.side:
-        asked = ["right", "left"] if args.side == "both" else [args.side]
+    subject, said = args.subject or "p01", _Said()
+    arguments = {"side": args.side} if args.side else {}
     stop = stop_on_signals()
     with Bus.open(args.endpoint, stop=stop) as bus:
-        guide = Guide(bus, args.room, args.subject or "p01", _say, stop)
-        plans = guide.run(asked)
-        return guide.heard.sensors(), plans
+        news = bus.subscribe(keys.calibration(args.room, subject))
+        key = keys.command(args.room, subject, "wear-check")
+        answer = asked(bus, key, arguments, news, said.show, stop, LONGEST_S + EXAMINED_S)
+    if answer is None:
+        if stop.is_set():
+            raise Failed("nothing can be said: stopped before its end")
+        raise Failed("fusion does not answer; is `brachium fuse` running in this room?")
+    if not answer.data:
+        raise Failed(answer.reason)
+    return answer.data
+
+
+class _Said:
+    """What was said last: an instruction once, then a countdown."""
+
+    def __init__(self) -> None:
+        self._words, self._left_s = "", 0
+
+    def show(self, news: "Calibration") -> None:
+        """Say what is new of a check that runs."""
+        wear = news.wear
+        if wear is None or wear.state != "running" or not wear.reason:
+            return
+        if wear.reason != self._words:
+            _say(wear.reason)
+        elif wear.left_s != self._left_s:
+            _say(f"  {wear.left_s}")
+        self._words, self._left_s = wear.reason, wear.left_s
 
 
 def _say(text: str) -> None:
     print(text, file=sys.stderr, flush=True)
 
 
-def _recorded(args: argparse.Namespace) -> "tuple[Sensors, list[Plan]]":
-    from brachium.wear_passes import Plan, extent
+def _recorded(args: argparse.Namespace) -> dict[str, Any]:
+    from brachium_fusion.wear_check import WearCheck
+    from brachium_fusion.wear_passes import CannotTell, Outcome, examine, plain
+
+    try:
+        return plain(examine(*_asked_for(args)))
+    except CannotTell as refusal:
+        return plain(Outcome(WearCheck(findings=(), refused=str(refusal)), {}, ()))
+
+
+def _asked_for(args: argparse.Namespace) -> "tuple[Sensors, list[Plan]]":
+    from brachium_fusion.wear_passes import Plan, extent
 
     spans = [getattr(args, name) for name in SPANS]
     if not args.moved or any(len(given) != len(args.moved) for given in spans):
@@ -107,7 +140,7 @@ def _recorded(args: argparse.Namespace) -> "tuple[Sensors, list[Plan]]":
 
 
 def _read(args: argparse.Namespace) -> "Sensors":
-    from brachium import wear_passes
+    from brachium_fusion import wear_passes
     from brachium_wire import capture, keys, recording
 
     if not args.input.exists():
@@ -122,30 +155,16 @@ def _read(args: argparse.Namespace) -> "Sensors":
             except keys.BadKey:
                 continue
             if parsed.topic in ("info", "imu") and args.subject in (None, parsed.subject):
-                heard.setdefault(parsed.subject or "", wear_passes.Heard()).take(key, payload)
+                heard.setdefault(parsed.subject or "", wear_passes.Heard()).take(parsed, payload)
     if len(heard) != 1:
         there = ", ".join(sorted(heard)) or "no such subject"
         raise Usage(f"the recording must hold one subject, or --subject name it; there is {there}")
     return next(iter(heard.values())).sensors()
 
 
-def _words(outcome: "Outcome") -> str:
-    lines = [f"{name}: not checked; it {why}" for name, why in outcome.left_out.items()]
-    if outcome.assumed:
-        lines.append(
-            f"nobody told how {', '.join(outcome.assumed)} should be worn: taken as the axes on the segment"
-        )
-    return "\n".join([*lines, *(finding.text for finding in outcome.check.findings)])
-
-
-def _figures(outcome: "Outcome") -> dict[str, object]:
-    return {
-        "fine": outcome.fine,
-        "refused": outcome.check.refused,
-        "findings": [
-            {"segment": f.segment, "seat": f.seat, "turn": f.turn, "fine": f.fine, "text": f.text}
-            for f in outcome.check.findings
-        ],
-        "left_out": outcome.left_out,
-        "mounting_assumed": list(outcome.assumed),
-    }
+def _words(found: dict[str, Any]) -> str:
+    lines = [f"{name}: not checked; it {why}" for name, why in found["left_out"].items()]
+    if found["mounting_assumed"]:
+        names = ", ".join(found["mounting_assumed"])
+        lines.append(f"nobody told how {names} should be worn: taken as the axes on the segment")
+    return "\n".join([*lines, *(finding["text"] for finding in found["findings"])])

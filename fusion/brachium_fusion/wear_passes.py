@@ -2,8 +2,9 @@
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
+import msgspec
 import numpy as np
 
 from brachium_body import rotation
@@ -18,6 +19,7 @@ from brachium_wire.capture import Capture
 from brachium_wire.codec import WireError, decode_batch, decode_topic
 from brachium_wire.messages import Info
 from brachium_wire.samples import Samples, read_samples
+from brachium_wire.sensor_records import WearFound
 from brachium_wire.topics import TOPICS
 
 SLOWEST_HZ = 12.0
@@ -63,29 +65,26 @@ class Outcome(NamedTuple):
 class Heard:
     """Collects one subject's infos and batches, from the bus or from a recording."""
 
-    def __init__(self) -> None:
-        self.infos: dict[str, Info] = {}
+    def __init__(self, infos: Mapping[str, Info] | None = None) -> None:
+        self.infos: dict[str, Info] = dict(infos or {})
         self.newest_s: dict[str, float] = {}
         """Time of each segment's newest sample."""
         self.drops: Counter[str] = Counter()
         self._batches: dict[str, list[Samples]] = {}
 
-    def take(self, key: str, payload: bytes) -> None:
+    def take(self, place: keys.Key, payload: bytes) -> None:
         """Take one message; what breaks the contract is counted and dropped."""
+        segment = place.detail
         try:
-            parsed = keys.parse(key)
-            segment = parsed.detail or ""
-            if parsed.topic == "info":
+            if place.topic == "info":
                 info = decode_topic(payload, "info")
                 if isinstance(info, Info):
                     self.infos[segment] = info
-            elif parsed.topic == "imu":
+            elif place.topic == "imu":
                 samples = read_samples(decode_batch(payload, TOPICS["imu"].max_bytes))
                 self._batches.setdefault(segment, []).append(samples)
                 newest = 1e-9 * samples.time_ns[-1]
                 self.newest_s[segment] = max(newest, self.newest_s.get(segment, newest))
-        except keys.BadKey:
-            self.drops["bad_key"] += 1
         except WireError as error:
             self.drops[error.drop.value] += 1
 
@@ -134,6 +133,25 @@ def examine(sensors: Sensors, plans: Sequence[Plan]) -> Outcome:
     except CannotTell as refusal:
         check = WearCheck(findings=(), refused=str(refusal))
     return Outcome(check, left_out, assumed)
+
+
+def findings(outcome: Outcome) -> list[WearFound]:
+    """Return the findings as they are told."""
+    return [
+        WearFound(segment=f.segment, seat=f.seat, turn=f.turn, fine=f.fine, text=f.text)
+        for f in outcome.check.findings
+    ]
+
+
+def plain(outcome: Outcome) -> dict[str, Any]:
+    """Return what a check says as plain values: what `wear-check` is answered with."""
+    return {
+        "fine": outcome.fine,
+        "refused": outcome.check.refused,
+        "findings": [msgspec.structs.asdict(finding) for finding in findings(outcome)],
+        "left_out": dict(outcome.left_out),
+        "mounting_assumed": list(outcome.assumed),
+    }
 
 
 def wear_pass(sensors: Sensors, plan: Plan, rate_hz: float) -> WearPass:
