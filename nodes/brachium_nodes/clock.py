@@ -37,6 +37,9 @@ class NodeClock:
         """Device time in us and host time less it in ns, both against the first; of questions negated."""
         self._quickest: tuple[int, int, int] | None = None
         """Round trip of an exchange, its device time and offset."""
+        self.known = False
+        """Whether an exchange was answered; before that only arrivals speak."""
+        self._begun = False
         self._origin_us = 0
         self._origin_ns = 0
         self._intercept, self._slope = 0.0, 0.0
@@ -46,11 +49,6 @@ class NodeClock:
         self._correction_ns, self._correction_us, self._correction_span_us = 0.0, 0, 1.0
         self._published_us: int | None = None
         self._settled = False
-
-    @property
-    def known(self) -> bool:
-        """Whether an exchange was answered; before that only arrivals speak."""
-        return self._quickest is not None
 
     @property
     def skew_ppm(self) -> float:
@@ -69,9 +67,9 @@ class NodeClock:
 
     def arrival(self, device_us: int, host_ns: int) -> None:
         """Take that a sample of device time `device_us` had arrived at `host_ns`."""
-        self._begin(device_us, host_ns)
-        elapsed = device_us - self._origin_us
-        self._ups.add(elapsed, host_ns - device_us * 1000 - self._origin_ns)
+        if not self._begun:
+            self._begin(device_us, host_ns)
+        self._ups.add(device_us - self._origin_us, host_ns - device_us * 1000 - self._origin_ns)
         if self._fit_us is None or host_ns - self._fit_host_ns >= REFIT_NS:
             self._refit(device_us, host_ns)
 
@@ -83,12 +81,13 @@ class NodeClock:
         backwards = bool(self._downs) and came_us - self._origin_us < self._downs.newest
         if left_us < came_us or round_trip < 0 or backwards:
             return False
-        self._begin(came_us, answered_ns - (left_us - came_us) * 1000)
+        if not self._begun:
+            self._begin(came_us, answered_ns - (left_us - came_us) * 1000)
         down, up = asked_ns - came_us * 1000, answered_ns - left_us * 1000
         self._downs.add(came_us - self._origin_us, self._origin_ns - down)
         if self._quickest is None or (not self._settled and round_trip <= self._quickest[0]):
             self._quickest = round_trip, came_us, (down + up) // 2 - self._origin_ns
-            self._fit_us = None  # the quickest so far: use it at once
+            self.known, self._fit_us = True, None  # the quickest so far: use it at once
         self.arrival(left_us, answered_ns)
         return True
 
@@ -97,32 +96,36 @@ class NodeClock:
         return np.array(self.host_times(device_us.tolist()), dtype=np.int64)
 
     def host_times(self, device_us: list[int]) -> list[int]:
-        """Return the same of a few: lists are quicker then."""
+        """Return the same of a few growing ones: lists are quicker then."""
         origin_us, origin_ns, since_us = self._origin_us, self._origin_ns, self._correction_us
         offset, slope = self._intercept, self._slope
-        first_us, last_us = min(device_us), max(device_us)
-        if since_us <= first_us and last_us <= since_us + self._correction_span_us:
+        end_us = since_us + self._correction_span_us
+        if since_us <= device_us[0] and device_us[-1] <= end_us:
             fading = self._correction_ns / self._correction_span_us
             offset += self._correction_ns + fading * (since_us - origin_us)
             slope -= fading
-        elif first_us < since_us + self._correction_span_us:
+        elif device_us[0] < end_us:
             return [us * 1000 + origin_ns + round(self._exact_ns(us)) for us in device_us]
         return [us * 1000 + origin_ns + int(offset + slope * (us - origin_us)) for us in device_us]
 
     def publish(self, device_us: int) -> None:
         """Take that host times up to this device time are given away: later estimates join on to them."""
-        self._published_us = max(device_us, self._published_us or 0)
+        if self._published_us is None or device_us > self._published_us:
+            self._published_us = device_us
 
     def uncertainty_ns(self, device_us: int) -> int:
         """Return the half width within which the host time of `device_us` is believed to lie."""
-        fade = min(max(1.0 - (device_us - self._correction_us) / self._correction_span_us, 0.0), 1.0)
-        age = abs(device_us - self._fit_us) if self._fit_us is not None else 0
-        drift = DRIFT if self._settled else MAX_SLOPE
-        return round(abs(self._gap_ns) / 2 + abs(self._correction_ns) * fade + drift * age)
+        uncertain = abs(self._gap_ns) / 2
+        if self._fit_us is not None:
+            uncertain += (DRIFT if self._settled else MAX_SLOPE) * abs(device_us - self._fit_us)
+        fade = 1.0 - (device_us - self._correction_us) / self._correction_span_us
+        if fade > 0.0:
+            uncertain += abs(self._correction_ns) * min(fade, 1.0)
+        return round(uncertain)
 
     def _begin(self, device_us: int, host_ns: int) -> None:
-        if not self._ups and not self._downs and self._fit_us is None:
-            self._origin_us, self._origin_ns = device_us, host_ns - device_us * 1000
+        self._begun = True
+        self._origin_us, self._origin_ns = device_us, host_ns - device_us * 1000
 
     def _refit(self, device_us: int, host_ns: int) -> None:
         oldest = device_us - self._origin_us - WINDOW_US

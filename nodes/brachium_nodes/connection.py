@@ -32,16 +32,16 @@ class Connection:
         socket.message, socket.closed = self._receive, self._closed
 
     def tick(self, now_s: float) -> None:
-        """Do what time asks for. Call it every 50 ms; `now_s`: the event loop's time."""
+        """Do what time asks for, when the conversation is due; `now_s`: the event loop's time."""
         self._socket.keep_alive(now_s)
-        if actions := self.conversation.tick(self._clock.now_ns()):
-            self.do(actions)
+        self.do(self.conversation.tick(self._clock.now_ns()))
 
     def do(self, actions: list[Action]) -> None:
         """Carry out what the conversation asks for. A peer that is gone is no error here."""
         for action in actions:
             if isinstance(action, Publish):
-                self._share(action)
+                if self.conversation.admission is not None:
+                    self._publish(self.conversation.admission, action.topic, action.message)
             elif isinstance(action, Send):
                 self._socket.send(action.frame)
             else:
@@ -55,16 +55,11 @@ class Connection:
     def _closed(self, oversize: bool) -> None:
         self._finish(oversize=oversize)
 
-    def _share(self, action: Publish) -> None:
-        admission = self.conversation.admission
-        if admission is not None:
-            self._publish(admission, action.topic, action.message)
-
     def _finish(self, *, oversize: bool = False) -> None:
         if self._gone:
             return
         self._gone = True
         for action in self.conversation.lost(self._clock.now_ns(), oversize=oversize):
-            if isinstance(action, Publish) and not (self.replaced and action.topic == "status"):
-                self._share(action)
+            if not (self.replaced and isinstance(action, Publish) and action.topic == "status"):
+                self.do([action])
         self._left(self)

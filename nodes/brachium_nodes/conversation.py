@@ -1,8 +1,7 @@
 """One connection of one node, without a socket: what came and when goes in, what is to be done comes out."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, NamedTuple
 
 from brachium_nodes import node_frames as f
 from brachium_nodes.batch_blocks import MAX_DEVICE_US, Measured, measure
@@ -25,23 +24,20 @@ HOLD_NS = 1_000_000_000
 MAX_HELD = 256
 
 
-@dataclass(frozen=True, slots=True)
-class Send:
+class Send(NamedTuple):
     """Send this frame to the node."""
 
     frame: bytes
 
 
-@dataclass(frozen=True, slots=True)
-class Close:
+class Close(NamedTuple):
     """Close the connection."""
 
     code: int
     reason: str
 
 
-@dataclass(frozen=True, slots=True)
-class Publish:
+class Publish(NamedTuple):
     """Put this on the bus, on the key of the node's segment. Info is retained."""
 
     topic: Literal["info", "imu", "status"]
@@ -65,7 +61,9 @@ class Conversation:
         self._keeping: Keeping | None = None
         self._asked: dict[int, int] = {}
         self._next_id = 0
-        self._ask_ns = self._status_ns = now_ns
+        self.due_ns = now_ns
+        """When the next clock question is due; with it, `tick` does all else that time asks for."""
+        self._status_ns = now_ns
         self._counted_ns, self._counted = now_ns, 0
         self._held: list[tuple[Measured, int]] = []
 
@@ -79,22 +77,15 @@ class Conversation:
         if self.closed:
             return []
         try:
-            frame = f.from_node(payload)
+            return self._take(f.from_node(payload), now_ns)
         except WireError as error:
             if self.admission is None:
                 return self._refuse(Refusal("bad_hello", f"the first frame must be hello/1: {error}"))
             self._drop(error)
             return []
-        if self.admission is None or isinstance(frame, f.Hello):
-            return self._greet(frame, now_ns)
-        try:
-            return self._take(frame, now_ns)
-        except WireError as error:
-            self._drop(error)
-            return []
 
     def tick(self, now_ns: int) -> list[Action]:
-        """Do what time asks for: clock questions, status, the end of patience. Call it every 50 ms."""
+        """Do what time asks for: clock questions, status, the end of patience. Call it when it is due."""
         if self.closed:
             return []
         if self.admission is None:
@@ -102,7 +93,7 @@ class Conversation:
                 return self._close(f.CLOSE_NO_HELLO, "no hello within 3 s")
             return []
         actions: list[Action] = []
-        if now_ns >= self._ask_ns:
+        if now_ns >= self.due_ns:
             actions.append(self._ask(now_ns))
         if self._held and now_ns - self._held[0][1] > HOLD_NS:
             actions += self._release()
@@ -168,10 +159,10 @@ class Conversation:
         return [Publish("info", info), *([] if frame is None else [Send(encode(frame))])]
 
     def _take(self, frame: f.NodeFrame, now_ns: int) -> list[Action]:
-        assert self.admission is not None
-        assert self.hello is not None
+        if self.admission is None or self.hello is None or isinstance(frame, f.Hello):
+            return self._greet(frame, now_ns)
         if isinstance(frame, f.Batch):
-            return self._batch(measure(frame, self.hello), now_ns)
+            return self._batch(self.admission, measure(frame, self.hello), now_ns)
         if isinstance(frame, f.ClockAnswer):
             return self._answer(frame, now_ns)
         if isinstance(frame, f.NodeStatus):
@@ -188,32 +179,34 @@ class Conversation:
         self.admission.memory.counter.end(frame.next_sequence)
         return [*released, *self._close(1000, "bye")]
 
-    def _batch(self, measured: Measured, now_ns: int) -> list[Action]:
-        assert self.admission is not None
-        memory = self.admission.memory
-        if not memory.clock.known and len(self._held) < MAX_HELD and now_ns - self._since_ns < HOLD_NS:
+    def _batch(self, admission: Admission, measured: Measured, now_ns: int) -> list[Action]:
+        known = admission.memory.clock.known
+        if not known and len(self._held) < MAX_HELD and now_ns - self._since_ns < HOLD_NS:
             self._held.append((measured, now_ns))
             return []
-        return [*self._release(), *self._publish(measured, now_ns)]
+        actions = self._release() if self._held else []
+        batch = stamp(measured, admission.memory, admission.place, now_ns)
+        if batch is not None:
+            actions.append(Publish("imu", batch))
+        return actions
 
     def _release(self) -> list[Action]:
         held, self._held = self._held, []
         actions: list[Action] = []
         for measured, received_ns in held:
+            assert self.admission is not None
             try:
-                actions += self._publish(measured, received_ns)
+                batch = stamp(measured, self.admission.memory, self.admission.place, received_ns)
             except WireError as error:
                 self._drop(error)
+                continue
+            if batch is not None:
+                actions.append(Publish("imu", batch))
         return actions
-
-    def _publish(self, measured: Measured, received_ns: int) -> list[Action]:
-        assert self.admission is not None
-        batch = stamp(measured, self.admission.memory, self.admission.place, received_ns)
-        return [] if batch is None else [Publish("imu", batch)]
 
     def _ask(self, now_ns: int) -> Send:
         often = now_ns - self._since_ns < ASK_OFTEN_FOR_NS
-        self._ask_ns = now_ns + (ASK_OFTEN_NS if often else ASK_NS)
+        self.due_ns = now_ns + (ASK_OFTEN_NS if often else ASK_NS)
         self._next_id = (self._next_id + 1) & 0xFFFF
         self._asked[self._next_id] = now_ns
         while len(self._asked) > MAX_ASKED:

@@ -23,6 +23,7 @@ from brachium_nodes.listening import CannotListen, listening_address, why_not
 from brachium_nodes.node_door import listening
 from brachium_nodes.node_frames import MAX_FRAME_BYTES, Hello
 from brachium_nodes.node_socket import House, NodeSocket
+from brachium_nodes.paced_loop import paced_loop
 from brachium_nodes.roster import SLIMEVR, Admission, NodeEntry, Refusal, Roster
 from brachium_wire import keys
 from brachium_wire.bus import DEFAULT_ENDPOINT, Bus
@@ -69,8 +70,8 @@ def run(settings: GatewaySettings, stop: threading.Event) -> None:
     checked_host(settings.id)
     known = KnownCalibrations(settings.calibrations)
     roster = Roster(settings.nodes, settings.join_token_sha256, known.of)
-    with Bus.open(settings.endpoint, stop=stop) as bus:
-        asyncio.run(Gateway(bus, settings, roster, known).serve(address, stop))
+    with Bus.open(settings.endpoint, stop=stop) as bus, asyncio.Runner(loop_factory=paced_loop) as runner:
+        runner.run(Gateway(bus, settings, roster, known).serve(address, stop))
 
 
 class Gateway:
@@ -138,7 +139,8 @@ class Gateway:
         self._open.add(connection)
 
     def _tick(self, now_s: float) -> None:
-        for connection in list(self._open):
+        now_ns = self._clock.now_ns()
+        for connection in [c for c in self._open if c.conversation.due_ns <= now_ns]:
             connection.tick(now_s)
 
     def _admit(self, hello: Hello, token: str, connection: Connection) -> Admission | Refusal:
@@ -178,20 +180,20 @@ class Gateway:
 
     def _publish(self, admission: Admission, topic: str, message: Message) -> None:
         room, subject, segment = self._settings.room, admission.subject, admission.segment
-        if topic == "info":
-            assert isinstance(message, Info)
-            self._known.told(message)
-            self._told[subject, segment] = admission.entry.id
-            self._bus.retain(keys.info(room, subject, segment), encode(message))
-        elif topic == "status":
-            assert isinstance(message, Status)
-            self._batteries.look(message)
-            self._bus.put(keys.status(room, subject, segment), encode(message))
-        else:
+        if topic == "imu":
             assert isinstance(message, SampleBatch)
             self._heart.counts["batches"] += 1
             self._heart.counts["samples"] += len(message.offsets) // 4
             self._bus.put(keys.imu(room, subject, segment), encode(message))
+        elif topic == "info":
+            assert isinstance(message, Info)
+            self._known.told(message)
+            self._told[subject, segment] = admission.entry.id
+            self._bus.retain(keys.info(room, subject, segment), encode(message))
+        else:
+            assert isinstance(message, Status)
+            self._batteries.look(message)
+            self._bus.put(keys.status(room, subject, segment), encode(message))
 
     def _bring_calibrations(self) -> None:
         """Tell nodes that are there what fusion found of their sensors; others get it when they come."""

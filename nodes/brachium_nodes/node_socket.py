@@ -31,7 +31,7 @@ READ_BYTES = 8192
 _quiet = logging.getLogger(f"{__name__}.handshake")
 _quiet.setLevel(logging.CRITICAL)  # every stranger's half handshake would be a traceback
 
-_incoming = bytearray(READ_BYTES)
+_incoming = memoryview(bytearray(READ_BYTES))
 """One for all sockets: what was read is taken out before the next one reads."""
 
 
@@ -98,18 +98,18 @@ class NodeSocket(asyncio.BufferedProtocol):
         closed, self.closed, self.message = self.closed, lambda _: None, lambda _: None
         closed(self._too_big)
 
-    def get_buffer(self, sizehint: int) -> bytearray:
+    def get_buffer(self, sizehint: int) -> memoryview:
         """Return where to read into."""
         del sizehint
         return _incoming
 
     def buffer_updated(self, nbytes: int) -> None:
         """Take what was read."""
-        data = bytes(memoryview(_incoming)[:nbytes])
+        data = bytes(_incoming[:nbytes])
         if self._reader is None:
             self._shake_hands(data)
         else:
-            self._take(data)
+            self._take(self._reader, data)
 
     def eof_received(self) -> bool:
         """Close, too."""
@@ -189,7 +189,7 @@ class NodeSocket(asyncio.BufferedProtocol):
         self._heard_s = self._pinged_s = self._loop.time()
         self._house.opened(self, request)
         if rest:
-            self._take(rest)
+            self._take(self._reader, rest)
 
     def _refuse(self) -> None:
         self._house.broken("broken_handshake")
@@ -201,9 +201,8 @@ class NodeSocket(asyncio.BufferedProtocol):
         assert self._transport is not None
         self._transport.close()
 
-    def _take(self, data: bytes) -> None:
-        assert self._reader is not None
-        came, broken = self._reader.feed(data)
+    def _take(self, reader: FrameReader, data: bytes) -> None:
+        came, broken = reader.feed(data)
         self._heard_s = self._loop.time()
         for kind, payload in came:
             if kind == ws.CLOSE:

@@ -4,8 +4,6 @@ from collections import Counter
 from dataclasses import dataclass, field
 from struct import pack
 
-import msgspec
-
 from brachium_nodes.batch_blocks import Measured
 from brachium_nodes.clock import NodeClock
 from brachium_wire.codec import Drop, WireError
@@ -44,10 +42,9 @@ def stamp(measured: Measured, memory: Memory, place: SegmentMemory, received_ns:
 
     Raises WireError for times that cannot be: then nothing is counted.
     """
-    batch, clock, device_us = measured.batch, memory.clock, measured.device_us
-    newest_us = device_us[-1]
-    expected = memory.counter.next
-    in_order = not batch.late and (expected is None or batch.sequence >= expected)
+    batch, device_us = measured.batch, measured.device_us
+    clock, counter, samples, newest_us = memory.clock, memory.counter, len(device_us), device_us[-1]
+    in_order = not batch.late and (counter.next is None or batch.sequence >= counter.next)
     if in_order and device_us[0] <= memory.newest_us:
         raise WireError(Drop.TIME_BACKWARDS, f"batch/1: t {batch.device_us} is not after the sample before")
     if not clock.known:
@@ -58,8 +55,14 @@ def stamp(measured: Measured, memory: Memory, place: SegmentMemory, received_ns:
     if in_order:
         clock.publish(newest_us)
     clock.arrival(newest_us, received_ns)
-    if not _new(measured, memory):
-        return None
+    repeated = counter.repeated
+    counter.feed(batch.sequence, samples)
+    if counter.repeated > repeated:
+        memory.drops[Drop.REPEATED.value] += counter.repeated - repeated
+        if counter.repeated - repeated == samples:
+            return None
+    if batch.late:
+        memory.late += samples
     if memory.base is None:
         memory.base = max(0, place.next_sequence - batch.sequence)
     sequence = batch.sequence + memory.base
@@ -67,26 +70,20 @@ def stamp(measured: Measured, memory: Memory, place: SegmentMemory, received_ns:
         memory.newest_us = newest_us
         if times[0] <= place.newest_ns:  # another node or boot was here before
             times = [t + place.newest_ns + 1 - times[0] for t in times]
-        place.newest_ns, place.next_sequence = times[-1], sequence + len(measured)
-    return msgspec.structs.replace(
-        batch,
+        place.newest_ns, place.next_sequence = times[-1], sequence + samples
+    first_ns = times[0]
+    return SampleBatch(
         sequence=sequence,
-        time_ns=times[0],
-        offsets=pack(f"<{len(times)}I", *[t - times[0] for t in times]),
+        time_ns=first_ns,
+        offsets=pack(f"<{samples}I", *[t - first_ns for t in times]),
+        device_us=batch.device_us,
+        device_offsets=batch.offsets,
         received_ns=received_ns,
         uncertainty_ns=uncertainty_ns,
+        acc=batch.acc,
+        gyr=batch.gyr,
+        mag=batch.mag,
+        mag_index=batch.mag_index,
+        quat=batch.quat,
+        late=batch.late,
     )
-
-
-def _new(measured: Measured, memory: Memory) -> bool:
-    """Count a batch; return whether anything in it is new."""
-    before = memory.counter.repeated
-    memory.counter.feed(measured.batch.sequence, len(measured))
-    again = memory.counter.repeated - before
-    if again:
-        memory.drops[Drop.REPEATED.value] += again
-    if again == len(measured):
-        return False
-    if measured.batch.late:
-        memory.late += len(measured)
-    return True

@@ -50,9 +50,12 @@ class FrameReader:
 
     def feed(self, data: bytes) -> tuple[list[Came], Broken | None]:
         """Return what is complete with these bytes, and what was wrong after it; then feed no more."""
-        came: list[Came] = []
         if self._rest:
-            data = self._rest + data
+            data, self._rest = self._rest + data, b""
+        plain = self._plain(data)
+        if plain is not None:
+            return [plain], None
+        came: list[Came] = []
         at = 0
         try:
             while (end := self._frame_end(data, at)) is not None:
@@ -64,6 +67,20 @@ class FrameReader:
             return came, broken
         self._rest = data[at:]
         return came, None
+
+    def _plain(self, data: bytes) -> Came | None:
+        """Return the message when the bytes are one, binary and whole, as nearly always: a quick look."""
+        have = len(data)
+        if have < 8 or data[0] != 0x80 | BINARY or self._message is not None:
+            return None
+        size, head = data[1] - 128, 6
+        if size == 126:
+            size, head = data[2] << 8 | data[3], 8
+            if size < 126:
+                return None
+        if have != head + size or size > self._max:
+            return None
+        return Came(BINARY, masked(data[head:], data[head - 4 : head]))
 
     def _frame_end(self, data: bytes, at: int) -> int | None:
         """Check the head of the frame at `at`; return where the frame ends, None when it is not all here."""

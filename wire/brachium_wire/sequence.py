@@ -44,7 +44,8 @@ class SequenceCounter:
             self.repeated += count - fills
             return -1
         self.received += count
-        self._miss(sequence)
+        if gap:
+            self._miss(sequence)
         self.next = sequence + count
         return gap
 
