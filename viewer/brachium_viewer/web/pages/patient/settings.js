@@ -54,5 +54,6 @@ place.addEventListener("click", async (event) => {
   await CHANGE[button.dataset.setting]();
   showSettings();
 });
+document.addEventListener("language", showSettings);
 armMoves("right");
 root.dataset.size = size();
