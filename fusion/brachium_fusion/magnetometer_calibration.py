@@ -82,8 +82,8 @@ def mag_ellipsoid(mag: Floats) -> SensorFit:
         )
     if not FIELD_LEAST <= scores["field_ut"] <= FIELD_MOST:
         raise Refused(
-            f"the field has {scores['field_ut']:.0f} uT, the Earth's has 22 to 67: iron or a magnet is near; "
-            "go to another place"
+            f"the readings fit a field of {scores['field_ut']:.0f} uT, the Earth's has 22 to 67: "
+            "iron or a magnet is near; go to another place"
         )
     return SensorFit(
         method="mag-ellipsoid",
