@@ -1,5 +1,6 @@
 """What is exported: a result as it is, a recording's live skeletons, a capture folder solved on the way."""
 
+from contextlib import suppress
 from pathlib import Path
 
 from brachium.shell import Usage
@@ -7,11 +8,15 @@ from brachium_fusion import from_recording, solve
 from brachium_fusion.result import tabulate
 from brachium_fusion.result_quality import assumptions
 from brachium_fusion.solve_table import tabled
-from brachium_wire import recording, table
-from brachium_wire.messages import Skeleton
+from brachium_wire import keys, recording, table
+from brachium_wire.codec import WireError, decode_topic
+from brachium_wire.messages import Event, Skeleton
+from brachium_wire.recording import Recorded
 from brachium_wire.table import Table
 
 SIDES = ("right", "left")
+OWN_KINDS = ("applied", "settings")
+"""Events by which fusion keeps what it needs to repeat itself; all others were marked by somebody."""
 
 
 def table_of(source: Path, subject: str | None) -> Table:
@@ -32,7 +37,8 @@ def table_of(source: Path, subject: str | None) -> Table:
 def _live(source: Path, subject: str | None) -> Table | None:
     """Return a recording's skeletons as they were live; None when it has samples alone."""
     with recording.read(source) as messages:
-        subjects = from_recording.sort_out(messages)
+        arrived = list(messages)
+    subjects = from_recording.sort_out(arrived)
     moving = {name: contents for name, contents in subjects.items() if contents.live}
     if not moving:
         return None
@@ -62,9 +68,25 @@ def _live(source: Path, subject: str | None) -> Table | None:
             "assumed": assumptions(skeletons),
             "subject": name,
             "time_zero_ns": times_ns[0],
+            "events": events_of(arrived, name, times_ns[0]),
             "settings": settings,
         },
     )
+
+
+def events_of(arrived: list[Recorded], subject: str, zero_ns: int) -> list[dict[str, object]]:
+    """Return what was marked: exercises, pain, notes, taps, markers; seconds from the first instant."""
+    found: list[dict[str, object]] = []
+    for key, payload, _ in arrived:
+        with suppress(keys.BadKey, WireError):
+            parsed = keys.parse(key)
+            if parsed.topic != "event" or parsed.subject != subject:
+                continue
+            event = decode_topic(payload, "event")
+            if isinstance(event, Event) and event.kind not in OWN_KINDS:
+                at = {"time_s": 1e-9 * (event.time_ns - zero_ns), "kind": event.kind}
+                found.append({**at, "text": event.text, "data": event.data})
+    return sorted(found, key=lambda one: float(str(one["time_s"])))
 
 
 def origin_of(skeletons: list[Skeleton]) -> str:

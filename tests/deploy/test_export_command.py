@@ -13,12 +13,15 @@ from brachium.export_source import origin_of
 from brachium_body.continuation import AngleTracker
 from brachium_fusion import from_recording
 from brachium_nodes.wearer import Wearer, WearerSettings
+from brachium_viewer import marks
 from brachium_wire import keys, recording, table
 from brachium_wire.codec import encode
 from brachium_wire.messages import Event
 
 LEFT_SILENT = range(30, 60)
 START_NS = 1_700_000_000_000_000_000
+MARK_NS = 4_500_000_000
+"""An exercise begins half a second after the first skeleton."""
 
 
 @pytest.fixture(scope="module")
@@ -37,6 +40,8 @@ def live(tmp_path_factory: pytest.TempPathFactory) -> Path:
     with recording.RecordingWriter(path) as file:
         settings = Event(time_ns=START_NS, kind="settings", data={"filter": "vqf", "magnetometer": False})
         file.write(keys.event("gym", "p07"), encode(settings), START_NS)
+        begun = marks.event(marks.ExerciseBegins(exercise="elbow-flexion", side="left"), START_NS + MARK_NS)
+        file.write(keys.event("gym", "p07"), encode(begun), START_NS + 1)
         for side in ("right", "left"):
             for row, skeleton in enumerate(wearer.skeletons(t, side, START_NS, AngleTracker())):
                 if side == "right" or row not in LEFT_SILENT:
@@ -77,6 +82,25 @@ def test_both_arms_of_a_recording_end_in_a_c3d_file_by_the_ending_of_out(live: P
     assert read["data"]["points"].shape == (4, 8, 20)
     silent = np.isnan(read["data"]["points"][0, 4:]).all(axis=0)
     assert np.flatnonzero(silent).tolist() == [10, 11, 12, 13, 14, 15, 16, 17, 18, 19]
+
+
+def test_what_was_marked_stands_in_the_file_at_its_time(live: Path, tmp_path: Path):
+    import kineticstoolkit
+
+    out, study = tmp_path / "arms.c3d", tmp_path / "study"
+    assert run("export", live, "--out", out, "--from", 0.2) == 0
+    found = kineticstoolkit.read_c3d(str(out), convert_point_unit=False)["Points"].events
+    assert [(event.name.split(":")[-1], round(event.time, 6)) for event in found] == [("exercise", 0.3)]
+    assert run("export", live, "--to", "motion-bids", "--out", study, "--from", 0.2) == 0
+    (events,) = study.rglob("*_events.tsv")
+    rows = [line.split("\t") for line in events.read_text().splitlines()]
+    assert rows == [
+        ["onset", "duration", "trial_type", "text"],
+        ["0.300000", "0", "exercise", "n/a"],
+    ]
+    assert run("export", live, "--out", tmp_path / "later.csv", "--from", 1.0) == 0
+    (told,) = table.read(tmp_path / "later.csv").metadata["events"]
+    assert told["data"]["side"] == "left"
 
 
 @pytest.mark.parametrize("to", ["parquet", "sto", "mot", "trc", "c3d", "bvh", "rrd", "motion-bids"])

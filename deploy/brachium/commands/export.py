@@ -48,6 +48,9 @@ def configure(parser: argparse.ArgumentParser) -> None:
         help="from the motion's first instant",
     )
     parser.add_argument("--until", dest="until_s", type=real(0.0, LONGEST_S), metavar="S", help="likewise")
+    parser.add_argument(
+        "--measured", action="store_true", help="leave out what is held, assumed or uncalibrated"
+    )
     parser.add_argument("--session", metavar="NAME", help="of motion-bids: the session, as in 1")
     parser.add_argument("--task", metavar="NAME", help="of motion-bids: what was done")
     add_json(parser)
@@ -65,6 +68,7 @@ def run(args: argparse.Namespace) -> int:
         rate_hz=args.rate,
         from_s=args.from_s,
         until_s=args.until_s,
+        measured=args.measured,
         session=args.session,
         task=args.task,
     )

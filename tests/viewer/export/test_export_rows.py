@@ -81,3 +81,23 @@ def test_a_span_counts_from_the_first_instant_and_an_empty_one_is_refused():
     assert rows.between(table, 0.5, 1.0).columns["time"].tolist() == pytest.approx(np.arange(7.5, 8.0, 0.02))
     with pytest.raises(TableError, match=r"nothing from 5 s on: the motion has 1\.98 s"):
         rows.between(table, 5.0, None)
+
+
+def test_what_was_not_measured_is_left_out_when_asked():
+    table = moving(np.arange(100) / 50.0)
+    words = np.where(np.arange(100) % 2 == 0, "assumed", "disturbed")
+    table.columns["quality_elbow_angles"] = words
+    left = rows.measured(table)
+    assert (np.isnan(left.columns["elbow_flexion"]) == (words == "assumed")).all()
+    assert (np.isnan(left.columns["forearm_r_qw"]) == (table.columns["quality_forearm_r"] == "held")).all()
+    assert np.isfinite(left.columns["time"]).all()
+    with pytest.raises(TableError, match="--measured needs the columns of quality"):
+        rows.measured(rows.chosen(table, ("clinical",)))
+
+
+def test_every_number_of_a_result_has_its_quality(result: Table):
+    """Of a result as it is: where nothing is measured of the left arm, nothing of it is left."""
+    words = {n: np.full(len(result), "held") for n in result.columns if n.startswith("quality_")}
+    left = rows.measured(Table(result.columns | words, result.units, result.metadata))
+    stays = {n for n, v in left.columns.items() if v.dtype.kind == "f" and np.isfinite(v).any()}
+    assert stays == {"time"}

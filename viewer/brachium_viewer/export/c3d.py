@@ -1,6 +1,7 @@
 """C3D, as gait laboratories' tools read it: joint centres as points, joint angles as analogue channels."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -45,11 +46,24 @@ def write_c3d(motion: Motion, path: Path) -> list[Path]:
     text = one_line(motion.about | {"frames": MARKER_FRAMES})
     chunks = [text[i : i + CHUNK] for i in range(0, len(text), CHUNK)]
     made.add_parameter(KEY.upper(), "ABOUT", chunks)
+    if motion.events:
+        _add_events(made, motion.events)
     made["data"]["points"] = points
     made["data"]["meta_points"]["residuals"] = np.where(unknown, -1.0, 0.0)[None]
     made["data"]["analogs"] = np.stack(list(angles.values()))[None] if angles else np.zeros((1, 0, n))
     made.write(str(path))
     return [path]
+
+
+def _add_events(made: Any, events: list[dict[str, Any]]) -> None:
+    """Add what was marked, as laboratories' tools show it above the time line."""
+    seconds = [float(event["time_s"]) for event in events]
+    made.add_parameter("EVENT", "USED", [len(events)])
+    made.add_parameter("EVENT", "CONTEXTS", ["General"] * len(events))
+    made.add_parameter("EVENT", "LABELS", [str(event["kind"]) for event in events])
+    made.add_parameter("EVENT", "DESCRIPTIONS", [str(event["text"])[:CHUNK] for event in events])
+    # Minutes and seconds, one column an event.
+    made.add_parameter("EVENT", "TIMES", np.array([[0.0] * len(events), seconds]))
 
 
 def angles_deg(motion: Motion) -> dict[str, np.ndarray]:

@@ -48,6 +48,8 @@ class Wish:
     """None: the motion's own."""
     from_s: float | None = None
     until_s: float | None = None
+    measured: bool = False
+    """Leave out what is held, assumed or uncalibrated."""
     session: str | None = None
     """Of motion-bids, as `task`."""
     task: str | None = None
@@ -72,6 +74,8 @@ def prepared(source: Table, wish: Wish, made_by: str) -> Motion:
     cut = source
     if wish.from_s is not None or wish.until_s is not None:
         cut = rows.between(cut, wish.from_s, wish.until_s)
+    if wish.measured:
+        cut = rows.measured(cut)
     if wish.columns:
         cut = rows.chosen(cut, wish.columns)
     if FORMATS[wish.to].even or wish.rate_hz is not None:
@@ -83,6 +87,7 @@ def prepared(source: Table, wish: Wish, made_by: str) -> Motion:
         rate_hz=wish.rate_hz,
         from_s=wish.from_s,
         until_s=wish.until_s,
+        measured=wish.measured or None,
         session=wish.session,
         task=wish.task,
     )

@@ -56,6 +56,13 @@ class Motion:
         return 1.0 / period_s(self.time_s)
 
     @property
+    def events(self) -> list[dict[str, Any]]:
+        """Return what was marked while the motion lasts, `time_s` counted from its first instant."""
+        first, last = float(self.time_s[0]), float(self.time_s[-1])
+        told = self.about.get("events", [])
+        return [e | {"time_s": e["time_s"] - first} for e in told if first <= e["time_s"] <= last]
+
+    @property
     def ground_from_world(self) -> Floats:
         """Return what turns world axes (4,) to those of a level ground: X forward, Y up, Z to the right.
 

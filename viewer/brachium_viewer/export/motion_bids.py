@@ -62,7 +62,22 @@ def write_motion_bids(motion: Motion, folder: Path) -> list[Path]:
     _write_tsv(where / f"{stem}_channels.tsv", [heads, *([getattr(c, h) for h in heads] for c in found)])
     _write_json(where / f"{stem}_channels.json", FRAMES)
     _write_json(where / f"{stem}_motion.json", _described(motion, task, found))
+    if motion.events:
+        _write_tsv(where / f"{stem.replace(f'_tracksys-{SYSTEM}', '')}_events.tsv", _events(motion))
     return [*_study(folder, subject, motion), tsv]
+
+
+def _events(motion: Motion) -> list[list[str]]:
+    """Return what was marked, each an instant without length."""
+    rows = [["onset", "duration", "trial_type", "text"]]
+    for event in motion.events:
+        rows.append([f"{event['time_s']:.6f}", "0", str(event["kind"]), _plain(event["text"])])
+    return rows
+
+
+def _plain(text: str) -> str:
+    """Return a text as one cell can hold it."""
+    return " ".join(str(text).split()) or UNKNOWN
 
 
 def channels(motion: Motion) -> list[Channel]:

@@ -7,9 +7,10 @@ import numpy as np
 import numpy.typing as npt
 
 from brachium_body import rotation
-from brachium_body.angles import CLAVICLE, COLUMNS, TRUNK
+from brachium_body.angles import CLAVICLE, COLUMNS, SHARING_QUALITY, TRUNK
 from brachium_body.kinematics import JOINTS
 from brachium_body.segments import SEGMENTS
+from brachium_viewer.metrics.arm_motion import MEASURED
 from brachium_wire.table import Table, TableError
 
 Floats = npt.NDArray[np.float64]
@@ -81,6 +82,36 @@ def _group(column: str) -> str:
     if bare.rpartition("_")[0] in JOINTS:
         return "positions"
     return "sensors" if "_sensor_q" in column else "segments" if column[:-3] in SEGMENTS else ""
+
+
+def measured(table: Table) -> Table:
+    """Return the table without what is held, assumed, uncalibrated or rests on an assumed heading.
+
+    Raises TableError when no column tells which numbers are.
+    """
+    if not any(name.startswith("quality_") for name in table.columns):
+        raise TableError("--measured needs the columns of quality, and there are none; solve with them")
+    columns = dict(table.columns)
+    for name, values in columns.items():
+        words = table.columns.get(_quality(name))
+        if values.dtype.kind == "f" and words is not None:
+            columns[name] = np.where(np.isin(words, list(MEASURED)), values, np.nan)
+    return Table(columns, table.units, table.metadata)
+
+
+def _quality(column: str) -> str:
+    """Return the name of the column that tells how far to trust another."""
+    end = column[-2:] if column.endswith(("_r", "_l")) else ""
+    bare = column.removesuffix(end)
+    segment = column.removesuffix(column[-3:]).removesuffix("_sensor")
+    if segment in SEGMENTS and column[-3:-1] == "_q":
+        return f"quality_{segment}"
+    for group, angles in SHARING_QUALITY.items():
+        if bare in angles:
+            return f"quality_{group}{end}"
+    joint, _, axis = bare.rpartition("_")
+    joint = "shoulder" if joint.startswith("shoulder_shift") else joint
+    return f"quality_{joint}_position{end}" if joint in JOINTS and axis in ("x", "y", "z") else ""
 
 
 def evenly(table: Table, rate_hz: float) -> Table:
