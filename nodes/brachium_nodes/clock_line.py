@@ -2,7 +2,7 @@
 
 from bisect import bisect_left
 from collections import deque
-from itertools import pairwise
+from itertools import islice, pairwise
 
 Point = tuple[int, int]
 
@@ -20,6 +20,7 @@ class Below:
         self._steepest = steepest
         self._blocks: deque[list[Point]] = deque()
         self._sums: deque[list[int]] = deque()  # of each block: points, and the sum of their x
+        self._older: list[Point] | None = None  # the edge of all blocks but the last, once it was asked for
         self._block = 0
         self._first: int | None = None
         self._last = 0
@@ -57,6 +58,7 @@ class Below:
             self._block = block
             self._blocks.append([(x, y)])
             self._sums.append([1, x])
+            self._older = None
             if self._first is None:
                 self._first = x
             return
@@ -72,14 +74,19 @@ class Below:
         while self._blocks and (self._blocks[0][-1][0] // BLOCK_US + 1) * BLOCK_US <= before:
             self._blocks.popleft()
             self._sums.popleft()
+            self._older = None
             self._first = self._blocks[0][0][0] if self._blocks else None
 
     def edge(self) -> list[Point]:
         """Return the corners of the lower edge, by x."""
-        edge: list[Point] = []
-        for block in self._blocks:
-            for point in block:
-                _extend(edge, point)
+        if self._older is None:
+            self._older = []
+            for block in islice(self._blocks, max(len(self._blocks) - 1, 0)):
+                for point in block:
+                    _extend(self._older, point)
+        edge = self._older.copy()
+        for point in self._blocks[-1] if self._blocks else ():
+            _extend(edge, point)
         return edge
 
 
