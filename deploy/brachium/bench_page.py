@@ -37,7 +37,7 @@ CHROMIUM = ("chromium", "chromium-browser", "google-chrome")
 SOFTWARE = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-quic"]
 """No graphics card: what every machine can do."""
 
-# Notes when the newest frame was heard and when what was drawn of it was over. Every picture begins with clear.
+# Notes how long ago a frame was published when its picture was done. Every picture begins with clear.
 LISTENER = """
 window.__late = [];
 let newest = null;

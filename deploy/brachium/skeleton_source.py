@@ -1,4 +1,4 @@
-"""Two arms and six sensors on the bus at their usual rates, at next to no cost: for what only looks at them."""
+"""Two arms and six sensors on the bus at their usual rates, at next to no cost: for what only looks."""
 
 import threading
 import time

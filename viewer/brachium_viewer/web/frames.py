@@ -5,6 +5,7 @@ A number whose quality is no measurement goes with that quality beside it; one t
 
 from typing import Any
 
+import msgspec
 import numpy as np
 
 from brachium_body.ranges import FUNCTIONAL, REFERENCE, Range
@@ -96,6 +97,7 @@ def calibration(news: Calibration | None) -> Json | None:
         "scores": {name: round(value, 2) for name, value in news.scores.items()},
         "warnings": news.warnings,
         "refused": news.refused,
+        "wear": None if news.wear is None else msgspec.to_builtins(news.wear),
     }
 
 

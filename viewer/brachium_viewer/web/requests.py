@@ -17,7 +17,7 @@ Words = Annotated[str, msgspec.Meta(max_length=500)]
 
 
 class BadRequest(ValueError):
-    """What cannot be asked: one line that says what was expected; `id` and `verb` as far as they can be read."""
+    """What cannot be asked, in one line; `id` and `verb` as far as they can be read."""
 
     def __init__(self, text: str, head: "Head") -> None:
         super().__init__(text)

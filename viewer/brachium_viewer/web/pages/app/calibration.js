@@ -5,16 +5,23 @@ import { has, say } from "./words.js";
 
 const RUNNING = new Set(["waiting", "running"]);
 
+const WEAR_STEPS = ["listen", "ready", "hang", "raise", "bend"];
+
+function seat({ segment, seat: place, turn, fine }) {
+  const name = say(`segment.${segment}`);
+  if (fine) return say("wear.right", { segment: name });
+  if (place === null) return say("wear.unknown", { segment: name });
+  if (place !== segment) return say("wear.elsewhere", { segment: name, seat: say(`segment.${place}`) });
+  return say("wear.turned", { segment: name, turn: say(`turn.${turn || "both"}`) });
+}
+
 export class Calibration {
   constructor(link) {
     this.link = link;
     $("calibrate-guided").addEventListener("click", () => this.ask("calibrate", { routine: "guided" }));
     $("calibrate-pose").addEventListener("click", () => this.ask("calibrate", { routine: "pose" }));
     $("zero").addEventListener("click", () => this.ask("zero"));
-    $("wear-check").addEventListener("click", async () => {
-      const answer = await busy($("wear-check"), () => link.ask("wear-check"));
-      tell($("wear-said"), answer, (answer.data?.words ?? []).join(" "));
-    });
+    $("wear-check").addEventListener("click", () => this.checkWear());
     $("donning").addEventListener("click", async () => {
       tell($("wear-said"), await busy($("donning"), () => link.ask("donning")), say("donning.done"));
     });
@@ -30,24 +37,54 @@ export class Calibration {
     if (this.news !== undefined) this.show(this.news);
   }
 
+  async checkWear() {
+    this.asked = true;
+    this.buttons(true);
+    const answer = await this.link.ask("wear-check");
+    this.asked = false;
+    tell($("wear-said"), answer, this.news?.wear?.fine ? say("wear.fine") : say("wear.done"));
+    if (this.news !== undefined) this.show(this.news);
+  }
+
   buttons(disabled) {
-    for (const id of ["calibrate-guided", "calibrate-pose", "zero"]) $(id).disabled = disabled;
+    for (const id of ["calibrate-guided", "calibrate-pose", "zero", "wear-check"]) $(id).disabled = disabled;
+  }
+
+  /** What is to be done now, and how far it is; null when nothing runs. */
+  step(news) {
+    const wear = news?.wear;
+    if (wear?.state === "running") {
+      const side = say(`side.${wear.side || "right"}`);
+      const left = wear.left_s ? ` ${say("seconds", { seconds: wear.left_s })}` : "";
+      return { words: say(`wear.${wear.step}`, { side }) + left, progress: WEAR_STEPS.indexOf(wear.step) / WEAR_STEPS.length };
+    }
+    if (news === null || !RUNNING.has(news.state) || !(this.asked || news.state === "running")) return null;
+    const key = `motion.${news.motion || news.pose}`;
+    return { words: has(key) ? say(key) : news.reason, progress: news.progress };
   }
 
   show(news) {
     this.news = news;
-    const runs = news !== null && RUNNING.has(news.state) && (this.asked || news.state === "running");
+    const step = this.step(news);
+    const runs = step !== null;
     this.buttons(runs || Boolean(this.asked));
     $("prompt").hidden = !runs;
     if (runs) {
-      const step = `motion.${news.motion || news.pose}`;
-      $("prompt-words").textContent = has(step) ? say(step) : news.reason;
-      $("prompt-progress").value = news.progress;
+      if ($("prompt-words").textContent !== step.words) $("prompt-words").textContent = step.words;
+      $("prompt-progress").value = step.progress;
     }
+    this.seats(news?.wear);
     $("calibration-state").classList.toggle("wrong", Boolean(this.refused));
     $("calibration-state").textContent = this.refused || this.words(news);
     const notes = news === null || runs ? [] : [...Object.values(news.refused), ...news.warnings];
     renew($("calibration-notes"), JSON.stringify(notes), () => notes.map((note) => make("li", {}, note)));
+  }
+
+  /** Where each sensor was found to sit. */
+  seats(wear) {
+    const found = wear?.state === "done" ? wear.findings.map(seat) : [];
+    const silent = wear?.state === "done" ? Object.keys(wear.left_out).map((name) => say("wear.left-out", { segment: say(`segment.${name}`) })) : [];
+    renew($("wear-notes"), JSON.stringify([found, silent]), () => [...found, ...silent].map((line) => make("li", {}, line)));
   }
 
   words(news) {
