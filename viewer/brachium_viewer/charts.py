@@ -49,11 +49,14 @@ def _figure(width_in: float, height_in: float) -> tuple[Any, Any]:
 
 
 def svg(figure: Any, name: str) -> str:
-    """Return a figure as SVG text for a page: no size of its own, and ids that no other chart of it has."""
+    """Return a figure as SVG text for a page: no size of its own, and ids that no other chart of it has.
+
+    Words stay words, so that they can be read out and searched.
+    """
     import matplotlib
 
     out = io.StringIO()
-    with matplotlib.rc_context({"svg.hashsalt": name, "svg.fonttype": "path"}):
+    with matplotlib.rc_context({"svg.hashsalt": name, "svg.fonttype": "none"}):
         figure.savefig(out, format="svg", metadata={"Date": None}, transparent=True)
     text = out.getvalue()
     text = text[text.index("<svg") :]
@@ -65,8 +68,8 @@ def svg(figure: Any, name: str) -> str:
     text = re.sub(r'\bid="', f'id="{prefix}-', text)
     text = re.sub(r'href="#', f'href="#{prefix}-', text)
     text = re.sub(r"url\(#", f"url(#{prefix}-", text)
-    # A hundredth of a point is finer than any printer.
-    return re.sub(r'(?<= d=")M [^"]*', lambda path: re.sub(r"(\.\d\d)\d+", r"\1", path.group()), text)
+    # A tenth of a point is a thirtieth of a millimetre.
+    return re.sub(r'(?<= d=")M [^"]*', lambda path: re.sub(r"(\.\d)\d+", r"\1", path.group()), text)
 
 
 def thinned(time: Floats, values: Floats) -> tuple[Floats, Floats]:

@@ -1,8 +1,11 @@
 """What a recording holds, sorted out into arrays: the way in of figures, pages and exports."""
 
-from collections.abc import Iterable
+import gc
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -17,6 +20,7 @@ from brachium_wire.messages import (
     SampleBatch,
     Session,
     Skeleton,
+    Snapshot,
     Status,
 )
 from brachium_wire.recording import Recorded
@@ -64,6 +68,8 @@ class Contents:
     """The last of each subject."""
     sessions: dict[str, Session] = field(default_factory=dict)
     events: dict[str, list[Event]] = field(default_factory=dict)
+    fusion: dict[str, dict[str, Any]] = field(default_factory=dict)
+    """Fusion's settings for each subject."""
     unreadable: dict[str, int] = field(default_factory=dict)
     """Messages left out, by reason."""
 
@@ -82,10 +88,23 @@ class Contents:
 
 def load(path: Path) -> Contents:
     """Return what a recording holds; raises recording.RecordingError for a file that is none."""
-    with recording.read(path) as reading:
+    with recording.read(path) as reading, _uncollected():
         contents = sort_out(reading)
     contents.metadata, contents.warning = reading.metadata, reading.warning
     return contents
+
+
+@contextmanager
+def _uncollected() -> Iterator[None]:
+    """Keep the collector of cycles off: a hundred thousand records hold none, and it would look at each of
+    them again and again."""
+    on = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if on:
+            gc.enable()
 
 
 def sort_out(messages: Iterable[Recorded]) -> Contents:
@@ -108,7 +127,7 @@ def _count(contents: Contents, reason: str) -> None:
 
 
 def _take(contents: Contents, key: keys.Key, payload: bytes, log_time_ns: int) -> None:
-    if key.topic in ("health", "snapshot", "command"):
+    if key.topic in ("health", "command"):
         return
     message = decode_topic(payload, key.topic)
     who = (key.subject, key.detail)
@@ -132,6 +151,8 @@ def _take(contents: Contents, key: keys.Key, payload: bytes, log_time_ns: int) -
         contents.sessions[key.subject] = message
     elif isinstance(message, Event):
         contents.events.setdefault(key.subject, []).append(message)
+    elif isinstance(message, Snapshot):
+        contents.fusion[key.subject] = message.settings
 
 
 def times_ns(skeletons: Iterable[Skeleton]) -> Times:

@@ -98,17 +98,22 @@ def figures(path: Path) -> SummaryFigures:
 
 def of_contents(contents: Contents, name: str) -> SummaryFigures:
     """Return the figures of what a recording holds."""
-    sensors = sorted(contents.sensors.items(), key=c.outwards)
     return SummaryFigures(
         recording=name,
         started=contents.metadata.get("started", ""),
         duration_s=contents.duration_s,
         origins=contents.origins,
-        segments={"/".join(who): _segment(sensor) for who, sensor in sensors},
+        segments=segments(contents),
         arms={"/".join(who): _arm(arm) for who, arm in sorted(contents.arms.items()) if arm.published},
         unreadable=contents.unreadable,
         warning=contents.warning,
     )
+
+
+def segments(contents: Contents) -> dict[str, SegmentFigures]:
+    """Return each sensor's figures by `subject/segment`, from the trunk outwards."""
+    found = sorted(contents.sensors.items(), key=c.outwards)
+    return {"/".join(who): _segment(sensor) for who, sensor in found}
 
 
 def _segment(sensor: SensorContents) -> SegmentFigures:

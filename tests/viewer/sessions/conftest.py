@@ -80,9 +80,9 @@ class Script:
             self.messages.append((t, keys.skeleton("gym", self.subject, side), encode(one)))
         self.now_s += repetitions * 4.0
 
-    def set(self, repetitions: int, top_deg: float, side: Any = "right", **begins: Any) -> None:
+    def set(self, count: int, top_deg: float, side: Any = "right", **begins: Any) -> None:
         self.mark(marks.ExerciseBegins(exercise="elbow-flexion", side=side, **begins))
-        self.move(repetitions, top_deg, side)
+        self.move(count, top_deg, side)
         self.mark(marks.ExerciseEnds())
         self.now_s += 1.0
 

@@ -49,7 +49,10 @@ class ArmMotion:
     def between(self, from_s: float, to_s: float) -> "ArmMotion":
         """Return the instants in [from_s, to_s)."""
         first, end = (int(i) for i in np.searchsorted(self.time_s, [from_s, to_s]))
-        rows = slice(first, end)
+        return self.at(slice(first, end))
+
+    def at(self, rows: slice | Mask) -> "ArmMotion":
+        """Return some of the instants."""
         return ArmMotion(
             side=self.side,
             origin=self.origin,
@@ -71,26 +74,29 @@ def arm_motion(skeletons: Sequence[Skeleton], zero_ns: int = 0) -> ArmMotion:
         raise ValueError("there are no skeletons of this arm; record while fusion runs")
     n, last = len(skeletons), skeletons[-1]
     angles = np.full((n, len(COLUMNS)), np.nan)
-    words = np.full((n, len(COLUMNS) + len(JOINTS)), "missing", dtype="<U16")
+    words = np.full((len(COLUMNS) + len(JOINTS), n), "missing", dtype="<U15")
     places = np.full((len(JOINTS), n, 3), np.nan)
     shift = np.full((n, 3), np.nan)
     _fill([s.angles for s in skeletons], _COLUMN, angles)
     _fill([s.positions for s in skeletons], _JOINT, places.transpose(1, 0, 2))
-    words[:, : len(COLUMNS)][np.isfinite(angles)] = "good"
-    words[:, len(COLUMNS) :][np.isfinite(places).all(axis=2).T] = "good"
+    words[: len(COLUMNS)][np.isfinite(angles.T)] = "good"
+    words[len(COLUMNS) :][np.isfinite(places).all(axis=2)] = "good"
+    doubted: dict[tuple[str, str], list[int]] = {}
     for i, skeleton in enumerate(skeletons):
-        for name, quality in skeleton.assumed.items():
-            column = _WORD.get(name)
-            if column is not None and words[i, column] == "good":
-                words[i, column] = quality
+        for doubt in skeleton.assumed.items():
+            doubted.setdefault(doubt, []).append(i)
         if skeleton.shoulder_shift is not None:
             shift[i] = skeleton.shoulder_shift
+    for (name, quality), which in doubted.items():
+        if name in _WORD:
+            row, rows = words[_WORD[name]], np.array(which)
+            row[rows[row[rows] == "good"]] = quality
     return ArmMotion(
         side=last.side,
         origin=last.origin,
         time_s=np.array([(s.time_ns - zero_ns) / 1e9 for s in skeletons], dtype=np.float64),
         angles_deg=dict(zip(COLUMNS, np.degrees(angles).T, strict=True)),
-        quality=dict(zip((*COLUMNS, *JOINTS), words.T, strict=True)),
+        quality=dict(zip((*COLUMNS, *JOINTS), words, strict=True)),
         positions_m=dict(zip(JOINTS, places, strict=True)),
         shoulder_shift_m=shift,
         with_sternum=any(

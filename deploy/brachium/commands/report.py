@@ -1,0 +1,70 @@
+"""A session's report: one page of HTML that prints to A4, and a table of its repetitions.
+
+brachium report p01.mcap --out p01.html --csv p01.csv --sessions recordings
+"""
+
+import argparse
+import os
+from pathlib import Path
+
+from brachium.shell import Usage, add_json, print_json
+
+
+def configure(parser: argparse.ArgumentParser) -> None:
+    """Add the options."""
+    parser.add_argument("recording", type=Path, metavar="RECORDING", help="as brachium record writes it")
+    parser.add_argument("--out", type=Path, required=True, metavar="FILE", help="the page, .html")
+    parser.add_argument("--csv", type=Path, metavar="FILE", help="one row a repetition, .csv or .parquet")
+    parser.add_argument(
+        "--sessions", type=Path, metavar="DIR", help="earlier sessions, to stand beside this one"
+    )
+    parser.add_argument("--subject", help="which subject of the recording; needed where there are several")
+    parser.add_argument("--exercise", help="what was done, in a recording without marks")
+    parser.add_argument("--side", choices=("right", "left"), help="by which arm, in one without marks")
+    add_json(parser)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Write the page, and say what it holds."""
+    from brachium_viewer.exercises import EXERCISES
+    from brachium_viewer.marks import ExerciseBegins
+    from brachium_viewer.report import page
+
+    if (args.exercise is None) != (args.side is None):
+        raise Usage("--exercise and --side go together")
+    if args.exercise is not None and args.exercise not in EXERCISES:
+        raise Usage(f"--exercise {args.exercise!r} is not known; choose of {', '.join(EXERCISES)}")
+    check_writable(args.out, (".html",), "--out")
+    if args.csv is not None:
+        check_writable(args.csv, (".csv", ".parquet"), "--csv")
+    if args.sessions is not None and not args.sessions.is_dir():
+        raise Usage(f"--sessions {args.sessions}: there is no such folder")
+    begins = None if args.exercise is None else ExerciseBegins(exercise=args.exercise, side=args.side)
+    found = page.write(
+        page.ReportSettings(
+            recording=args.recording,
+            out=args.out,
+            csv=args.csv,
+            sessions=args.sessions,
+            subject=args.subject,
+            without_marks=begins,
+        )
+    )
+    if args.json:
+        print_json(found)
+        return 0
+    said = "" if found.origin == "worn" else f" ({found.origin})"
+    print(f"{args.out}: {found.subject}{said}, {found.sets} sets, {found.repetitions} repetitions")
+    if args.csv is not None:
+        print(f"{args.csv}: one row a repetition")
+    return 0
+
+
+def check_writable(path: Path, endings: tuple[str, ...], option: str) -> None:
+    """Refuse a file that could not be written, before anything is read."""
+    if path.suffix not in endings:
+        raise Usage(f"{option} {path}: its name ends in {' or '.join(endings)}")
+    if not path.parent.is_dir():
+        raise Usage(f"{option} {path}: there is no folder {path.parent}; make it first")
+    if path.is_dir() or not os.access(path if path.exists() else path.parent, os.W_OK):
+        raise Usage(f"{option} {path}: cannot be written; choose another")

@@ -1,0 +1,157 @@
+"""What a report is about: sets by exercise, arm and mode, beside each other and the past. Pure."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+from brachium_body.segments import Side
+from brachium_viewer.exercises import Exercise, exercise
+from brachium_viewer.metrics.both_arms import asymmetry, symmetry
+from brachium_viewer.metrics.change import Change, SmallestChange, smallest_change
+from brachium_viewer.metrics.measure import Measure
+from brachium_viewer.metrics.set_measures import SetMeasures, loss_between, together
+from brachium_viewer.sessions.records import METHOD, PastSet, SetRecord
+
+COMPARED = ("range", "best peak")
+"""What is compared with the last session: the only measures whose smallest detectable change is known."""
+
+History = Callable[[str, str, str], Sequence[PastSet]]
+"""A person's worn sets of an exercise, side and mode before this session, oldest first."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Group:
+    """The sets of one exercise by one arm in one mode, and all of them as one."""
+
+    exercise: Exercise
+    side: Side
+    mode: str
+    sets: tuple[SetRecord, ...]
+    pooled: SetMeasures
+
+
+@dataclass(frozen=True, kw_only=True)
+class Past:
+    """A group's last session, and what of it can be compared."""
+
+    started_ns: int
+    pooled: SetMeasures
+    changes: dict[str, Change]
+    """By COMPARED; empty when the measures were made by another method."""
+    method: int
+
+
+def groups(sets: Sequence[SetRecord]) -> list[Group]:
+    """Return the groups in the order in which they were begun; the modes of one exercise and arm follow one
+    another."""
+    order = list(dict.fromkeys(one.what[:2] for one in sets))
+    whats = sorted(dict.fromkeys(one.what for one in sets), key=lambda what: order.index(what[:2]))
+    return [_group([one for one in sets if one.what == what]) for what in whats]
+
+
+def _group(sets: list[SetRecord]) -> Group:
+    first = sets[0].measures
+    row = exercise(first.exercise)
+    side: Side = "left" if first.side == "left" else "right"
+    return Group(
+        exercise=row,
+        side=side,
+        mode=first.mode,
+        sets=tuple(sets),
+        pooled=together([one.measures for one in sets], row),
+    )
+
+
+def compared(measures: SetMeasures, name: str) -> Measure:
+    """Return one of COMPARED."""
+    return measures.medians["range"] if name == "range" else measures.best_peak
+
+
+def past(group: Group, history: History) -> Past | None:
+    """Return a group's last session; None when there is none."""
+    found = history(group.exercise.name, group.side, group.mode)
+    if not found:
+        return None
+    last = [one for one in found if one.session == found[-1].session]
+    pooled = together([one.set.measures for one in last], group.exercise)
+    changes = {}
+    if last[0].method == METHOD:
+        for name in COMPARED:
+            now, before = compared(group.pooled, name).value, compared(pooled, name).value
+            if now is not None and before is not None:
+                smallest = smallest_of(found, group, name)
+                changes[name] = Change(now=now, before=before, smallest=smallest)
+    return Past(started_ns=last[0].started_ns, pooled=pooled, changes=changes, method=last[0].method)
+
+
+def smallest_of(found: Sequence[PastSet], group: Group, name: str) -> SmallestChange:
+    """Return the smallest detectable change of a measure: from this person's repeated donnings, those of this
+    session too, or the stated one."""
+    sessions: dict[int, list[SetRecord]] = {}
+    for one in found:
+        if one.method == METHOD:
+            sessions.setdefault(one.session, []).append(one.set)
+    return smallest_change(
+        [pair for sets in (*sessions.values(), list(group.sets)) for pair in donning_pairs(sets, name)]
+    )
+
+
+def donning_pairs(sets: Sequence[SetRecord], name: str) -> list[tuple[float, float]]:
+    """Return a measure before and after each donning between two sets, in order, of one session."""
+    pairs = []
+    for before, after in pairwise(sets):
+        a, b = compared(before.measures, name).value, compared(after.measures, name).value
+        if before.donning != after.donning and a is not None and b is not None:
+            pairs.append((a, b))
+    return pairs
+
+
+def other_arm(group: Group, every: Sequence[Group]) -> Group | None:
+    """Return the same exercise in the same mode by the other arm."""
+    return next(
+        (g for g in every if (g.exercise, g.mode) == (group.exercise, group.mode) and g.side != group.side),
+        None,
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Symmetry:
+    """One arm beside the other in one exercise."""
+
+    group: Group
+    other: Group
+    range_percent: Measure
+    """The first one's range over the other's."""
+    jerk_percent: Measure
+    """Difference of LDLJ over its mean."""
+
+
+def symmetries(every: Sequence[Group], affected: str) -> list[Symmetry]:
+    """Return each exercise that both arms did: the affected arm over the other; right over left when neither
+    or both are."""
+    first = affected if affected in ("right", "left") else "right"
+    found = []
+    for group in every:
+        other = other_arm(group, every)
+        if group.side != first or other is None:
+            continue
+        ours, theirs = group.pooled.medians, other.pooled.medians
+        found.append(
+            Symmetry(
+                group=group,
+                other=other,
+                range_percent=symmetry(ours["range"], theirs["range"]),
+                jerk_percent=asymmetry(ours["ldlj"], theirs["ldlj"]),
+            )
+        )
+    return found
+
+
+def lags(every: Sequence[Group]) -> list[tuple[Group, Measure]]:
+    """Return, for each exercise and arm done both ways, by how much less far it goes by itself."""
+    passive = {(g.exercise.name, g.side): g for g in every if g.mode == "passive"}
+    return [
+        (g, loss_between(g.pooled, passive[key].pooled))
+        for g in every
+        if g.mode == "active" and (key := (g.exercise.name, g.side)) in passive
+    ]

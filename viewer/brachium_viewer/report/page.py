@@ -1,0 +1,163 @@
+"""`brachium report`: a recording to one page of HTML, and to a table. The shell: it touches files."""
+
+from contextlib import closing, nullcontext
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from brachium_viewer import contents as c
+from brachium_viewer import figures as f
+from brachium_viewer.marks import ExerciseBegins
+from brachium_viewer.page_sections import Chart
+from brachium_viewer.page_template import origin_words, render
+from brachium_viewer.report import report_charts, sentences, tidy, words
+from brachium_viewer.report import report_tables as tables
+from brachium_viewer.report.build import (
+    Report,
+    build,
+    longest_gaps,
+    movement_lines,
+    of_movement,
+    principal_components,
+    range_bars,
+)
+from brachium_viewer.report.groups import lags, symmetries
+from brachium_viewer.sessions import from_recording as sessions
+from brachium_viewer.sessions.store import Store
+
+TEMPLATE = Path(__file__).with_name("report.html.j2")
+
+
+@dataclass(frozen=True, kw_only=True)
+class ReportSettings:
+    """What to tell of, and where."""
+
+    recording: Path
+    out: Path
+    csv: Path | None = None
+    sessions: Path | None = None
+    """A store's folder: the last session and the subject's side come from there."""
+    subject: str | None = None
+    without_marks: ExerciseBegins | None = None
+    """What was done, where nobody marked it."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ReportFigures:
+    """What the page says, in a few numbers."""
+
+    subject: str
+    origin: str
+    sets: int
+    repetitions: int
+    compared: int
+    """Movements that stand beside the last session's."""
+    changed: int
+    """Of their measures, those beyond the smallest detectable change."""
+    bytes: int
+    """Of the page."""
+
+
+def write(settings: ReportSettings) -> ReportFigures:
+    """Write the page, and the table where one is wanted.
+
+    Raises recording.RecordingError for a file that is none, StoreError when there is nothing of the subject,
+    TableError for a table of another ending, and MissingExtra without `brachium[report]`.
+    """
+    contents = c.load(settings.recording)
+    name = settings.recording.name
+    who = sessions.the_subject(contents, name, settings.subject)
+    motions = sessions.motions(contents, who)
+    session = sessions.session(contents, name, who, motions, settings.without_marks)
+    opened: Any = nullcontext() if settings.sessions is None else closing(Store.open(settings.sessions))
+    with opened as store:
+        known = store.subject(who) if store is not None else None
+        report = build(
+            contents,
+            session,
+            motions,
+            lambda exercise, side, mode: (
+                store.history(who, exercise, side, mode, session.started_ns) if store is not None else ()
+            ),
+            known.affected_side if known is not None else "",
+        )
+    text = page(report)
+    settings.out.write_text(text, encoding="utf-8")
+    if settings.csv is not None:
+        tidy.write(settings.csv, session, report.zero_ns)
+    changes = [change for past in report.pasts if past is not None for change in past.changes.values()]
+    return ReportFigures(
+        subject=who,
+        origin=session.origin,
+        sets=len(session.sets),
+        repetitions=sum(len(one.measures.repetitions) for one in session.sets),
+        compared=sum(bool(past.changes) for past in report.pasts if past is not None),
+        changed=sum(change.detected for change in changes),
+        bytes=len(text.encode()),
+    )
+
+
+def page(report: Report) -> str:
+    """Return the page's HTML: no script, nothing loaded from elsewhere."""
+    session, groups = report.session, report.groups
+    origin_title, origin_text = origin_words([session.origin])
+    shown = []
+    if groups:
+        shown = [
+            tables.within_session(groups),
+            tables.between_arms(symmetries(groups, report.affected)),
+            tables.active_passive(lags(groups)),
+            tables.principal(principal_components(report)),
+        ]
+    segments = {
+        who: found
+        for who, found in f.segments(report.contents).items()
+        if who.split("/")[0] == session.subject
+    }
+    batteries = {
+        "/".join(who): None if sensor.status is None else sensor.status.battery_level
+        for who, sensor in report.contents.sensors.items()
+    }
+    return render(
+        TEMPLATE,
+        session=session,
+        date=tables.date(session.started_ns),
+        facts=sentences.facts(report),
+        worn=session.origin == "worn",
+        origin_title=origin_title,
+        origin_text=origin_text,
+        zero=sentences.how_zero_was_set(report),
+        warnings=sentences.warnings(report),
+        done=tables.done(groups) if groups else None,
+        ratings=tables.ratings(session.ratings),
+        ranges=_ranges(report),
+        comparison=tables.comparison(groups, report.pasts),
+        why_no_comparison=sentences.why_no_comparison(report),
+        movements=movement_charts(report),
+        measures=tables.measures(groups) if groups else None,
+        tables=[table for table in shown if table is not None],
+        withheld=tables.withheld(groups),
+        quality=tables.quality(segments, batteries, longest_gaps(report)),
+        method=sentences.method(report),
+        disclaimer=words.DISCLAIMER,
+    )
+
+
+def movement_charts(report: Report) -> list[Chart]:
+    """Return one row of figures for each exercise and arm that was repeated."""
+    drawn = []
+    for key in dict.fromkeys((g.side, g.exercise.name) for g in report.groups):
+        found, motion = of_movement(report, *key)
+        counts = {g.mode: len(g.pooled.repetitions) for g in found}
+        if not any(counts.values()):
+            continue
+        lines = movement_lines(found, motion, report.zero_ns)
+        label = ", ".join(f"{n} {mode}" for mode, n in counts.items())
+        svg = report_charts.movement("-".join(key), lines)
+        drawn.append(Chart(words.movement(key[1], key[0]).capitalize(), f"{label} repetitions", svg))
+    return drawn
+
+
+def _ranges(report: Report) -> str:
+    bars = range_bars(report)
+    return report_charts.ranges("ranges", bars) if bars else ""

@@ -1,0 +1,234 @@
+"""The report's tables: what was done, measures, comparisons, what was withheld, data quality. Pure."""
+
+from collections.abc import Iterable, Sequence
+from datetime import UTC, datetime
+
+from brachium_viewer.figures import SegmentFigures
+from brachium_viewer.metrics.both_arms import Components
+from brachium_viewer.metrics.measure import Measure
+from brachium_viewer.metrics.set_measures import FEW
+from brachium_viewer.page_sections import PageTable
+from brachium_viewer.report import words
+from brachium_viewer.report.groups import Group, Past, Symmetry
+from brachium_viewer.sessions.records import Rating
+
+NONE = "\N{EN DASH}"
+FULL = 0.97
+"""From so much on a measure's coverage is not printed beside it."""
+
+
+def date(time_ns: int) -> str:
+    """Return the day and minute of a host time, UTC."""
+    return f"{datetime.fromtimestamp(time_ns / 1e9, UTC):%Y-%m-%d %H:%M} UTC"
+
+
+def day(time_ns: int) -> str:
+    """Return the day of a host time, UTC."""
+    return f"{datetime.fromtimestamp(time_ns / 1e9, UTC):%Y-%m-%d}"
+
+
+def number(measure: Measure, digits: int, *, signed: bool = False) -> str:
+    """Return a value, with its coverage where it is not whole, or a dash."""
+    if measure.value is None:
+        return NONE
+    value = round(measure.value, digits) + 0.0  # no minus zero
+    shown = f"{value:+.{digits}f}" if signed and value else f"{value:.{digits}f}"
+    return shown if measure.coverage >= FULL else f"{shown} ({100 * measure.coverage:.0f} %)"
+
+
+def done(groups: Sequence[Group]) -> PageTable:
+    """Return what was done: a row a group of sets."""
+    rows = []
+    for group in groups:
+        wanted = sum(one.wanted or 0 for one in group.sets)
+        made = len(group.pooled.repetitions)
+        goal = group.pooled.goal_deg
+        ended = {words.ENDED[one.ended] for one in group.sets} - {""}
+        seconds = sum(one.to_ns - one.from_ns for one in group.sets) / 1e9
+        rows.append(
+            [
+                words.movement(group.exercise.name, group.side),
+                group.mode,
+                str(len(group.sets)),
+                f"{made} of {wanted}" if wanted else str(made),
+                str(group.pooled.tries),
+                NONE if goal is None else f"{goal:.0f}",
+                number(group.pooled.best_peak, 0),
+                f"{seconds / 60:.1f}",
+                ", ".join(sorted(ended)),
+            ]
+        )
+    head = ["", "mode", "sets", "repetitions", "tries", "goal, deg", "farthest, deg", "min", ""]
+    note = "A try is a movement that went less than half as far as the others; it is no repetition."
+    return PageTable("What was done", head, rows, note)
+
+
+def measures(groups: Sequence[Group]) -> PageTable:
+    """Return the medians of the repetitions: a row a measure, a column a group."""
+    word = "shoulder" if groups[0].pooled.shoulder_word == "shoulder" else "shoulder or trunk movement"
+    head = ["median of the repetitions", "unit"]
+    head += [words.movement(g.exercise.name, g.side, "" if g.mode == "active" else g.mode) for g in groups]
+    rows = []
+    for name, (label, digits) in words.MEASURES.items():
+        cells = [g.pooled.medians[name] for g in groups]
+        if name == "shoulder_shift":
+            label = f"{word}, {label}"
+        rows.append([label, cells[0].unit, *(number(cell, digits) for cell in cells)])
+    deficits = [
+        number(g.pooled.extension_deficit, 0) if g.exercise.angle == "elbow_flexion" else "" for g in groups
+    ]
+    if any(deficits):
+        rows.append(["short of straight", "deg", *deficits])
+    rows.append(["measured", "%", *(_coverage(g) for g in groups)])
+    return PageTable("Measures", head, rows)
+
+
+def _coverage(group: Group) -> str:
+    found = [r.measures["range"].coverage for r in group.pooled.repetitions]
+    return f"{100.0 * sum(found) / len(found):.0f}" if found else NONE
+
+
+def within_session(groups: Sequence[Group]) -> PageTable | None:
+    """Return the last five repetitions beside the first five; None when no group has as many."""
+    names = ("range", "peak_speed", "movement_time", "sparc")
+    rows = []
+    for g in groups:
+        cells = [g.pooled.first_to_last[name] for name in names]
+        if any(cell.value is not None for cell in cells):
+            shown = [number(c, words.MEASURES[n][1], signed=True) for n, c in zip(names, cells, strict=True)]
+            rows.append([words.movement(g.exercise.name, g.side, g.mode), *shown])
+    if not rows:
+        return None
+    head = ["", *(f"{words.MEASURES[n][0]}, {groups[0].pooled.medians[n].unit}" for n in names)]
+    note = f"Median of the last {FEW} repetitions minus that of the first {FEW}, over all sets."
+    return PageTable(f"Last {FEW} repetitions beside the first {FEW}", head, rows, note)
+
+
+def comparison(groups: Sequence[Group], pasts: Sequence[Past | None]) -> PageTable | None:
+    """Return this session beside the last; a change only beyond the smallest detectable one."""
+    rows = []
+    for group, past in zip(groups, pasts, strict=True):
+        for name, change in past.changes.items() if past is not None else ():
+            smallest = change.smallest
+            source = f"{smallest.pairs} repeated donnings" if smallest.pairs else "stated"
+            rows.append(
+                [
+                    f"{words.movement(group.exercise.name, group.side, group.mode)}: {name}",
+                    f"{change.before:.0f}",
+                    f"{change.now:.0f}",
+                    f"{smallest.value_deg:.0f} ({source})",
+                    f"{change.difference:+.0f} deg" if change.detected else words.WITHIN_ERROR,
+                ]
+            )
+    if not rows:
+        return None
+    when = sorted({day(past.started_ns) for past in pasts if past is not None})
+    head = [f"deg; last session: {', '.join(when)}", "last", "now", "smallest detectable change", "change"]
+    return PageTable("Beside the last session", head, rows)
+
+
+def between_arms(symmetries: Sequence[Symmetry]) -> PageTable | None:
+    """Return one arm beside the other."""
+    rows = [
+        [
+            f"{words.movement(s.group.exercise.name, s.group.side, s.group.mode)} over {s.other.side}",
+            number(s.range_percent, 0),
+            number(s.jerk_percent, 0, signed=True),
+        ]
+        for s in symmetries
+    ]
+    note = "100 % of range: both arms alike. Difference of LDLJ over its mean: 0 % is alike."
+    head = ["", "range of motion, %", "difference of LDLJ, %"]
+    return PageTable("Both arms", head, rows, note) if rows else None
+
+
+def active_passive(lags: Sequence[tuple[Group, Measure]]) -> PageTable | None:
+    """Return by how much less far an arm goes by itself."""
+    rows = [[words.movement(g.exercise.name, g.side), number(lag, 0)] for g, lag in lags]
+    head = ["", "farther when moved, deg"]
+    return PageTable("Active against passive", head, rows) if rows else None
+
+
+def principal(found: Sequence[tuple[Group, Components | None]]) -> PageTable | None:
+    """Return how much of the movement of all joint angles the first components explain."""
+    rows = []
+    for group, parts in found:
+        if parts is None:
+            continue
+        first = sorted(zip(parts.directions[0], parts.names, strict=True), key=lambda one: -abs(one[0]))[:3]
+        rows.append(
+            [
+                words.movement(group.exercise.name, group.side, group.mode),
+                *(f"{100 * share:.0f}" for share in [*parts.explained[:3], *[0.0] * 3][:3]),
+                ", ".join(
+                    f"{name.replace('_', ' ')} {weight:+.2f}" for weight, name in first if abs(weight) >= 0.1
+                ),
+            ]
+        )
+    head = ["variance explained, %", "1st", "2nd", "3rd", "the first one's directions"]
+    return PageTable("Principal components of the joint angles", head, rows) if rows else None
+
+
+def withheld(groups: Sequence[Group]) -> list[tuple[str, str]]:
+    """Return what is not shown, and why: (reason, what), each reason once."""
+    reasons: dict[str, dict[str, list[str]]] = {}
+    for g in groups:
+        where = words.movement(g.exercise.name, g.side, g.mode)
+        for name, (label, _) in words.MEASURES.items():
+            if why := g.pooled.medians[name].withheld:
+                reasons.setdefault(why, {}).setdefault(label, []).append(where)
+    found = []
+    for why, labels in reasons.items():
+        places = {tuple(where) for where in labels.values()}
+        everywhere = all(len(where) == len(groups) for where in places)
+        said = "" if everywhere else f" ({'; '.join(dict.fromkeys(w for where in places for w in where))})"
+        found.append((why, ", ".join(labels) + said))
+    partly = _partly(groups)
+    return [*found, *partly]
+
+
+def _partly(groups: Sequence[Group]) -> list[tuple[str, str]]:
+    found = []
+    for g in groups:
+        missing = [r.measures["range"] for r in g.pooled.repetitions if r.measures["range"].value is None]
+        if missing and len(missing) < len(g.pooled.repetitions):
+            reasons = [m.withheld for m in missing]
+            where = words.movement(g.exercise.name, g.side, g.mode)
+            what = f"range of {len(missing)} of {len(g.pooled.repetitions)} repetitions ({where})"
+            found.append((max(reasons, key=reasons.count), what))
+    return found
+
+
+def ratings(found: Iterable[Rating]) -> list[str]:
+    """Return pain and effort before and after, one line each."""
+    lines = []
+    kept = list(found)
+    for kind in ("pain", "effort"):
+        said = [f"{r.value} {r.when}" for r in kept if r.kind == kind]
+        if said:
+            lines.append(f"{kind} (0 to 10): {', '.join(said)}")
+    return lines
+
+
+def quality(
+    segments: dict[str, SegmentFigures], batteries: dict[str, float | None], gaps: dict[str, float]
+) -> PageTable:
+    """Return each sensor's samples and battery."""
+    rows = []
+    for who, s in segments.items():
+        level = batteries.get(who)
+        rows.append(
+            [
+                who.split("/", 1)[1].replace("_", " "),
+                s.node or NONE,
+                str(s.received),
+                f"{s.loss_percent:.2f}",
+                str(s.out_of_order),
+                NONE if level is None else f"{100 * level:.0f}",
+            ]
+        )
+    longest = "; ".join(f"{side} arm {gap:.1f} s" for side, gap in gaps.items())
+    note = f"Longest time without a skeleton while a set ran: {longest}." if gaps else ""
+    return PageTable(
+        "Data quality", ["", "node", "samples", "lost %", "out of order", "battery %"], rows, note
+    )

@@ -1,0 +1,100 @@
+"""The report's sentences: facts, how zero was set, warnings, method. Pure but for the version's number."""
+
+from importlib import metadata
+
+from brachium_viewer.exercises import PLANES_DEG
+from brachium_viewer.metrics.smoothness import CUTOFF_HZ, LDLJ_RATE_HZ
+from brachium_viewer.report import report_tables as tables
+from brachium_viewer.report import words
+from brachium_viewer.report.build import Report
+
+
+def facts(report: Report) -> list[str]:
+    """Return the line under the heading."""
+    minutes = report.contents.duration_s / 60.0
+    found = [tables.date(report.session.started_ns), f"{minutes:.0f} min" if minutes >= 2 else "under 2 min"]
+    if report.affected:
+        found.append(f"affected side: {report.affected}")
+    said = report.contents.sessions.get(report.session.subject)
+    if said is not None and said.height_m is not None:
+        found.append(f"height {said.height_m:.2f} m")
+    return [*found, f"recording {report.session.recording}"]
+
+
+def how_zero_was_set(report: Report) -> str:
+    """Return how the angles' zero and forward came about, one sentence."""
+    subject = report.session.subject
+    found = report.contents.calibrations.get(subject)
+    forward = {
+        arm.published[-1].forward
+        for (who, _), arm in report.contents.arms.items()
+        if who == subject and arm.published
+    }
+    facing = "; ".join(words.FORWARD[one] for one in sorted(forward))
+    if found is None or not (found.pose or found.mounting or found.state == "done"):
+        return f"The recording holds no calibration. Forward: {facing or words.FORWARD['none']}."
+    pose = f"in pose {found.pose}" if found.pose else "from stated mountings"
+    scores = ", ".join(f"{name.replace('_', ' ')} {value:.3g}" for name, value in found.scores.items())
+    return f"Zero {pose}. Forward {facing}." + (f" Scores: {scores}." if scores else "")
+
+
+def warnings(report: Report) -> list[str]:
+    """Return what a reader must know first."""
+    contents, subject = report.contents, report.session.subject
+    found = [contents.warning] if contents.warning else []
+    calibration = contents.calibrations.get(subject)
+    if calibration is not None:
+        found += list(calibration.warnings)
+        if calibration.state == "refused":
+            found.append(f"calibration refused: {calibration.reason}")
+        found += [f"{what.replace('_', ' ')} not found: {why}" for what, why in calibration.refused.items()]
+    if contents.unreadable:
+        found.append(
+            "left out: " + ", ".join(f"{n} messages {why}" for why, n in contents.unreadable.items())
+        )
+    if not report.groups:
+        found.append(
+            "No exercise is marked in this recording, so nothing was measured: name it with --exercise and "
+            "--side."
+        )
+    return found
+
+
+def why_no_comparison(report: Report) -> str:
+    """Return why no earlier session stands beside this one; empty when one does."""
+    if not report.groups or any(past is not None and past.changes for past in report.pasts):
+        return ""
+    if report.session.origin != "worn":
+        return "Not put beside earlier sessions: what nobody wore is kept out of a person's history."
+    others = {past.method for past in report.pasts if past is not None}
+    if others:
+        return "Not put beside the last session: its numbers were found by another method; add it anew."
+    return "No earlier session of these exercises is known."
+
+
+def method(report: Report) -> list[str]:
+    """Return how the numbers were found: what one must know to find them again."""
+    bands = ", ".join(f"{name} {low:.0f} to {high:.0f}" for name, (low, high) in PLANES_DEG.items())
+    fusion = report.contents.fusion.get(report.session.subject, {})
+    settings = ", ".join(f"{name} {value}" for name, value in fusion.items() if _plain(value))
+    return [
+        f"Measures by method {report.session.method}, Brachium {_version()}."
+        + (f" Fusion: {settings}." if settings else ""),
+        f"SPARC up to {CUTOFF_HZ:.0f} Hz of the way there; LDLJ of its speed at {LDLJ_RATE_HZ:.0f} Hz; both "
+        "are smoother closer to 0.",
+        f"Elevation of the arm counts for an exercise in this band of its plane, deg: {bands}. Shoulder "
+        f"angles are {words.SHOULDER}.",
+        "Ranges are from the resting start to the farthest point held for 0.2 s. AAOS reference: ranges of "
+        "healthy adults in general, not what is to be expected of one person.",
+    ]
+
+
+def _plain(value: object) -> bool:
+    return isinstance(value, str | int | float) and not isinstance(value, bool)
+
+
+def _version() -> str:
+    try:
+        return metadata.version("brachium")
+    except metadata.PackageNotFoundError:
+        return "from its source tree"

@@ -1,0 +1,58 @@
+"""Every word of the report that is not in its template: one place for a catalogue to translate."""
+
+from collections.abc import Mapping
+
+DISCLAIMER = (
+    "Brachium is a measuring and research tool, not a medical device: it diagnoses nothing, scores no "
+    "clinical scale and advises no treatment."
+)
+WITHIN_ERROR = "within measurement error"
+SHOULDER = "arm against trunk, never the shoulder joint alone"
+
+MEASURES: Mapping[str, tuple[str, int]] = {
+    "start": ("start", 0),
+    "peak": ("farthest", 0),
+    "range": ("range of motion", 0),
+    "peak_speed": ("peak speed", 0),
+    "mean_speed": ("mean speed", 0),
+    "movement_time": ("movement time", 1),
+    "time_to_goal": ("time to goal", 1),
+    "hold_time": ("hold at the top", 1),
+    "sparc": ("smoothness, SPARC", 2),
+    "ldlj": ("smoothness, LDLJ", 2),
+    "hand_path": ("hand path", 2),
+    "straightness": ("straightness", 2),
+    "shoulder_shift": ("translation", 3),
+    "trunk_lean": ("trunk lean", 0),
+}
+"""By measure: its name, and the digits that are worth reading."""
+
+ANGLES: Mapping[str, str] = {
+    "elbow_flexion": "elbow flexion",
+    "isb_elevation": "elevation of the arm",
+    "shoulder_rotation": "shoulder rotation, internal +",
+    "forearm_pronation": "forearm pronation",
+    "wrist_flexion": "wrist flexion",
+    "wrist_deviation": "wrist deviation, ulnar +",
+    "shoulder_flexion": "shoulder flexion",
+    "shoulder_abduction": "shoulder abduction",
+}
+
+FORWARD: Mapping[str, str] = {
+    "sternum": "from a sensor on the sternum",
+    "elbow": "from led elbow movements: their axis points to the right",
+    "facing": "as stated against magnetic north",
+    "mounting": "from how the upper arm's sensor is nominally worn",
+    "none": "not known: headings are assumed",
+}
+ENDED: Mapping[str, str] = {"done": "", "stopped": "stopped", "patient-stop": "stopped by the patient"}
+
+
+def exercise(name: str) -> str:
+    """Return an exercise's name as people read it."""
+    return name.replace("-", " ")
+
+
+def movement(name: str, side: str, mode: str = "") -> str:
+    """Return what was done by which arm, and how where it is said."""
+    return f"{exercise(name)}, {side}" + (f", {mode}" if mode else "")
