@@ -12,6 +12,7 @@ from typing import Any, ParamSpec, TypeVar
 from brachium_viewer.sessions.from_recording import session_from_recording
 from brachium_viewer.sessions.records import SessionRecord
 from brachium_viewer.sessions.store import Store
+from brachium_wire.table import MissingExtra
 
 Json = dict[str, Any]
 P = ParamSpec("P")
@@ -29,11 +30,23 @@ def apart(function: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
 
 
 def keep(recording: Path, subject: str) -> Json:
-    """Put the session of a recording into the store of its folder; return how many sets it has."""
-    record = session_from_recording(recording, subject)
-    with Store.open(recording.parent) as store:
-        store.add(record)
-    return {"sets": len(record.sets)}
+    """Put the session of a recording into the store of its folder, and write its report beside it.
+
+    Returns the report's address; without one, why there is none.
+    """
+    folder = recording.parent
+    with Store.open(folder) as store:
+        store.add(session_from_recording(recording, subject))
+    from brachium_viewer.report import page as report  # heavy
+
+    page = report_page(recording)
+    try:
+        report.write(
+            report.ReportSettings(recording=recording, out=page, sessions=folder, subject=subject)
+        )
+    except MissingExtra as error:
+        return {"report": None, "why": str(error)}
+    return {"report": report_link(page), "why": ""}
 
 
 def earlier(folder: Path, subject: str) -> list[Json]:

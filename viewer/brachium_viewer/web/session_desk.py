@@ -62,13 +62,11 @@ class SessionDesk:
         if self._closed is None:
             raise NoRecording(self.failure or "the recording could not be closed")
         path = self._closed.path
-        told: Json = {"recording": path.name, "subject": subject, "report": None, "ended": self._closed.ended}
-        told |= await asyncio.to_thread(keeping.apart, keeping.keep, path, subject)
-        page = keeping.report_page(path)
-        if page.is_file():
-            told["report"] = keeping.report_link(page)
-        self._history = None, []
-        return told
+        try:
+            kept = await asyncio.to_thread(keeping.apart, keeping.keep, path, subject)
+        finally:
+            self._history = None, []
+        return {"recording": path.name, "subject": subject, "ended": self._closed.ended, **kept}
 
     def state(self, subject: str | None) -> Json:
         """Return what a page shows of the recording, of alarms and of what was before."""

@@ -95,7 +95,8 @@ function history() {
     state.history.map((one) => {
       const when = new Date(one.started).toLocaleDateString(language, { dateStyle: "medium" });
       const what = one.sets.map((row) => say("history.set", { exercise: say(`exercise.${row.exercise}`), count: row.count ?? "–" }));
-      const name = make("span", {}, make("strong", {}, when), ` ${what.join(", ")}`);
+      const origin = one.origin === "worn" ? [] : [make("span", { class: "small" }, ` ${say(`origin.${one.origin}.short`)}`)];
+      const name = make("span", {}, make("strong", {}, when), ` ${what.join(", ")}`, ...origin);
       const open = one.report ? [make("a", { href: one.report, target: "_blank", rel: "noopener" }, say("report.open"))] : [];
       return make("li", {}, name, ...open);
     }),
@@ -130,7 +131,8 @@ $("report").addEventListener("click", async () => {
   $("report-open").hidden = true;
   tell($("report-said"), { ok: true }, say("report.making"));
   const answer = await busy($("report"), () => link.ask("report"));
-  tell($("report-said"), answer, say("report.done", { file: answer.data?.recording ?? "" }));
+  const notes = [answer.data?.ended, answer.data?.why].filter(Boolean).join(" ");
+  tell($("report-said"), answer, `${say("report.done", { file: answer.data?.recording ?? "" })} ${notes}`);
   if (!answer.ok) return;
   set = 1;
   clearRatings();
