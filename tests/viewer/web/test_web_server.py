@@ -81,6 +81,11 @@ def test_a_session_from_its_first_rating_to_the_store(serve_pages, watch, moving
             assert state["recording"]["state"] == "off"
             assert state["history"][0]["origin"] == "emulated"
             assert (tmp_path / done["data"]["recording"]).is_file()
+            assert state["history"][0]["report"] == done["data"]["report"]
+            async with aiohttp.ClientSession() as visitor:
+                report = await visitor.get(serving.address + done["data"]["report"])
+                assert "script" not in report.headers["Content-Security-Policy"]
+                assert "p01" in await report.text()
 
         with serve_pages(endpoint=moving_arm, sessions=tmp_path, open_door=True) as serving:
             watch(serving.address, session)
@@ -149,7 +154,7 @@ def test_a_screen_that_does_not_read_slows_no_other_and_skips_frames(
             async with asyncio.timeout(40.0):
                 while not skipped():
                     before = times[-1] if times else 0.0
-                    frame = await screen.until(lambda m: m["kind"] == "frame" and m["sent"] > before)
+                    frame = await screen.until(lambda m, t=before: m["kind"] == "frame" and m["sent"] > t)
                     times.append(frame["sent"])
             assert times == sorted(set(times))
             assert len(times) > 20  # the one that reads was given frames all the while
