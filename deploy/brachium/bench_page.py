@@ -108,7 +108,7 @@ def measure(window_s: float) -> PageFigures:
     with TemporaryDirectory() as made, Processes() as processes:
         folder = Path(made)
         endpoint = start_router(processes, folder)
-        with Bus.open(endpoint) as bus, SkeletonSource(bus), _chromium() as browser:
+        with Bus.open(endpoint) as bus, SkeletonSource(bus), chromium() as browser:
             server, address = start_pages(processes, folder, endpoint, bus)
             alone = [_cpu(server, window_s) for _ in range(WINDOWS)]
             page, empty = [], []
@@ -149,7 +149,8 @@ def _said(folder: Path) -> str:
 
 
 @contextmanager
-def _chromium() -> "Iterator[Browser]":
+def chromium() -> "Iterator[Browser]":
+    """Start the machine's Chromium without a screen. Raises Failed without it or playwright."""
     program = next((found for name in CHROMIUM if (found := shutil.which(name))), None)
     if program is None:
         raise Failed("this needs Chromium (apt install chromium)")
