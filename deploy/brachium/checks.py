@@ -14,7 +14,7 @@ from typing import Literal
 
 from brachium.shell import EXTRAS
 
-USUAL_PORTS = {"router": 7447, "gateway": 8765, "view": 9090}
+USUAL_PORTS = {"router": 7447, "gateway": 8765, "view": 9090, "web": 8080}
 
 State = Literal["ok", "limited", "broken"]
 

@@ -13,7 +13,7 @@ import msgspec
 from brachium_body.segments import Segment
 from brachium_wire import keys
 
-ServiceName = Literal["router", "gateway", "slimevr", "fuse", "record", "view"]
+ServiceName = Literal["router", "gateway", "slimevr", "fuse", "record", "web", "view"]
 SERVICES: tuple[ServiceName, ...] = get_args(ServiceName)
 
 Quaternion = tuple[float, float, float, float]
@@ -33,6 +33,7 @@ class Ports(_Table, frozen=True, kw_only=True):
     router: int = 7447
     gateway: int = 8765
     web: int = 8080
+    view: int = 9090
 
 
 class Room(_Table, frozen=True, kw_only=True):
@@ -45,6 +46,8 @@ class Room(_Table, frozen=True, kw_only=True):
     services: tuple[ServiceName, ...] = ("router", "gateway", "fuse", "record")
     recordings: str = "recordings"
     """Folder of the recorder."""
+    sessions: str = "sessions"
+    """Folder of the pages' sessions."""
     calibrations: str = "calibrations"
     """Folder of the nodes' sensor calibrations, as `brachium sensor --out` writes it."""
     password: bool | None = None

@@ -27,6 +27,7 @@ KINDS = {
     "slimevr": "slimevr",
     "fuse": "fusion",
     "record": "recorder",
+    "web": "web",
     "view": "view",
 }
 
@@ -60,8 +61,10 @@ def services(site: Site, path: Path, *, join_token: str, users_file: Path | None
         "slimevr": ["slimevr", *network, "--bind", room.bind, "--site", str(path)],
         "fuse": ["fuse", *network],
         "record": ["record", *network, "--out", room.recordings],
-        "view": ["view", *network, "--web", "--web-port", str(room.ports.web)],
+        "web": ["web", *network, "--bind", room.bind, "--port", str(room.ports.web)],
+        "view": ["view", *network, "--web", "--web-port", str(room.ports.view)],
     }
+    words["web"] += ["--sessions", room.sessions]
     words["gateway"] += [
         "--site",
         str(path),
@@ -72,7 +75,12 @@ def services(site: Site, path: Path, *, join_token: str, users_file: Path | None
     ]
     if users_file is not None:
         words["router"] += ["--users", str(users_file)]
-    ports = {"router": room.ports.router, "gateway": room.ports.gateway, "view": room.ports.web}
+    ports = {
+        "router": room.ports.router,
+        "gateway": room.ports.gateway,
+        "web": room.ports.web,
+        "view": room.ports.view,
+    }
     named = [
         Service(name=name, words=words[name], kind=KINDS[name], port=ports.get(name))
         for name in room.services

@@ -143,6 +143,7 @@ BAD_INPUT = {
 
 BAD_NUMBERS = {
     "fuse": {"--rate": ("0", "-1", "nan", "inf", "x")},
+    "web": {"--port": ("99999", "-1", "x"), "--subject": ("../x",)},
     "view": {"--web-port": ("99999", "-1", "x"), "--grpc-port": ("99999",), "--subject": ("../x",)},
     "play": {"--speed": ("nan", "0", "-1", "inf"), "--seconds": ("nan", "-1", "0")},
     "emulate": {

@@ -13,7 +13,7 @@ WHOLE = """
 id = "gym"
 bind = "192.0.2.7"
 ports = { router = 7001, gateway = 7002, web = 7003 }
-services = ["router", "gateway", "slimevr", "fuse", "record", "view"]
+services = ["router", "gateway", "slimevr", "fuse", "record", "web", "view"]
 [[subject]]
 id = "p01"
 side = "left"

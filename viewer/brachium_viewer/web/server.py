@@ -66,8 +66,11 @@ class WebSettings:
 def run(settings: WebSettings, stop: threading.Event) -> None:
     """Serve the pages until `stop` is set.
 
-    Raises WebError when the port is taken or the door would stand open to others, NoRouter without a router.
+    Raises WebError when the port is taken or the door would stand open to others, BadKey for a subject that
+    cannot be one, NoRouter without a router.
     """
+    if settings.subject is not None:
+        keys.subject_chunk(settings.subject)
     if settings.open_door and not is_loopback(settings.bind):
         raise WebError(
             f"without a password the pages are for this machine only; {settings.bind} is reached by others: "
