@@ -14,6 +14,7 @@ from cantools import database
 
 from brachium_nodes.can import service
 from brachium_nodes.can.map_files import SHIPPED
+from brachium_nodes.can.own_ids import OtherSender, OwnIds
 from brachium_nodes.can.port import NoInterface, Port, PortSettings
 from brachium_wire import keys
 from brachium_wire.bus import Bus
@@ -269,6 +270,58 @@ def test_an_emulated_arm_is_refused_in_frames_of_can_fd(endpoint: str, tmp_path:
 
         with running(settings), moving_arm(bus, "fd", "emulated"):
             until(lambda: next_reason() == "origin")
+
+
+def test_a_frame_alike_in_every_bit_is_a_strangers_when_it_comes_once_more_than_it_went_out():
+    ids = OwnIds(range(0x300, 0x309), echoes=True)
+    ids.sent(0x300, b"alike")
+    came = [ids.is_strange(0x300, b"alike") for _ in range(2)]
+    assert came == [False, True]
+    assert not ids.is_strange(0x310, b"other arm")
+    silent = OwnIds(range(0x300, 0x309), echoes=False)
+    silent.sent(0x300, b"alike")
+    assert silent.is_strange(0x300, b"alike")
+
+
+def ended(settings: service.CanSettings) -> str:
+    """Run until it ends by itself; return why."""
+    with pytest.raises(OtherSender) as found:
+        service.run(settings, threading.Event())
+    return str(found.value)
+
+
+@pytest.mark.parametrize(
+    "port",
+    [
+        PortSettings(interface="virtual", channel="brachium-two"),
+        PortSettings(
+            interface="udp_multicast", channel="239.74.163.9", port=43119
+        ),  # gives back what it sends
+    ],
+    ids=lambda port: port.interface,
+)
+def test_a_second_sender_of_one_arm_sends_nothing_and_a_stranger_on_its_ids_ends_the_first(
+    endpoint: str, tmp_path: Path, port: PortSettings
+):
+    table = tmp_path / "joints.toml"
+    table.write_text(JOINTS)
+    settings = service.CanSettings(endpoint=endpoint, room="two", port=port, joints=table)
+    said: list[str] = []
+    going = threading.Thread(target=lambda: said.append(ended(settings)))
+    with can.Bus(**port.words()) as wire:
+        going.start()
+        until(lambda: wire.recv(WITHIN_S))
+        second = ended(settings)
+        assert "sends 0x30" in second
+        assert "right arm of p01" in second
+        assert "base_id" in second
+        while wire.recv(0.0):
+            pass
+        assert wire.recv(WITHIN_S) is not None  # the first goes on
+        assert said == []
+        wire.send(can.Message(arbitration_id=0x306, data=bytes(8), is_extended_id=False))
+        going.join(WITHIN_S)
+    assert "sends 0x306" in said[0]
 
 
 def test_an_interface_that_is_not_there_is_one_line():

@@ -8,7 +8,8 @@ from typing import TypeVar
 
 from brachium_nodes.can.arm_frames import ArmValue, Reason, classic_frames, fd_frame
 from brachium_nodes.can.arm_output import ArmOutput
-from brachium_nodes.can.joint_table import JointTable
+from brachium_nodes.can.joint_table import IDS, JointTable
+from brachium_nodes.can.own_ids import OtherSender, OwnIds
 from brachium_nodes.can.port import Port
 from brachium_wire import keys
 from brachium_wire.bus import Bus
@@ -22,10 +23,12 @@ T = TypeVar("T", bound=Message)
 FOLLOW_S = 10.0
 """How often the host is asked anew for its time: two hosts drift apart by less than a ms meanwhile."""
 RETRY_S = 0.5
+LISTEN_S = 0.25
+"""For so long nothing is sent: an arm that is on the bus already, at 20 Hz or more, is heard before."""
 
 
 class ArmSender:
-    """One arm of one subject. `tick` when a frame is due; `close` at the end."""
+    """One arm of one subject. `tick` when a frame is due; `hear` what comes; `close` at the end."""
 
     def __init__(
         self,
@@ -35,9 +38,12 @@ class ArmSender:
         origins: frozenset[Origin],
         *,
         fd: bool,
+        echoes: bool,
     ) -> None:
         self._bus, self._room, self._table, self._fd = bus, room, table, fd
         self._output, self._origins = ArmOutput(table, origins), origins
+        self._ids = OwnIds(range(table.first_id, table.first_id + IDS), echoes=echoes)
+        self._begin_s = time.monotonic() + LISTEN_S
         self._skeletons = bus.subscribe(keys.skeleton(room, table.subject, table.side), capacity=64)
         place = keys.calibration(room, table.subject)
         self._calibrations = bus.subscribe(place, capacity=16)
@@ -65,19 +71,29 @@ class ArmSender:
         self._send(port, value)
         self._tell(value)
 
+    def hear(self, number: int, data: bytes | bytearray) -> None:
+        """Look at a frame that came. Raises OtherSender when it has one of this arm's ids."""
+        if self._ids.is_strange(number, data):
+            raise OtherSender(
+                f"somebody else on the bus sends {number:#x}, an id of the {self._table.side} arm of "
+                f"{self._table.subject}: nothing more goes out from here; end the other one, or give this "
+                "arm ids of its own with base_id"
+            )
+
     def close(self) -> None:
         """End the thread that asks for the time."""
         self._ended.set()
         self._follower.join(2.0)
 
     def _send(self, port: Port, value: ArmValue) -> None:
+        if time.monotonic() < self._begin_s:
+            return
         first = self._table.first_id
-        if self._fd:
-            number, data = fd_frame(first, self._alive, value)
-            port.send(number, data, fd=True)
-        else:
-            for number, data in classic_frames(first, self._alive, value):
-                port.send(number, data)
+        alive = self._alive
+        frames = [fd_frame(first, alive, value)] if self._fd else classic_frames(first, alive, value)
+        for number, data in frames:
+            if port.send(number, data, fd=self._fd):
+                self._ids.sent(number, data)
         self.counts["arm_frames"] += 1
         valid = sum(joint.reason is Reason.VALID for joint in value.joints)
         self.counts["valid_joints"] += valid

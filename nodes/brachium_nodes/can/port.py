@@ -74,6 +74,11 @@ class Port:
         """Whether the interface is open."""
         return self._bus is not None
 
+    @property
+    def echoes(self) -> bool:
+        """Whether our own frames come back: python-can keeps them from us, but cannot with multicast."""
+        return self._settings.interface == "udp_multicast"
+
     def receive(self, timeout_s: float) -> tuple[int, bytes | bytearray] | None:
         """Return the next data frame's id (bit 31 set for 29 bits) and bytes, or None after `timeout_s`."""
         if self._bus is None and not self._reopened():

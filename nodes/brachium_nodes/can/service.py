@@ -49,8 +49,8 @@ class CanSettings:
 def run(settings: CanSettings, stop: threading.Event) -> None:
     """Serve until `stop` is set.
 
-    Raises BadMap, FileNotFoundError, NoInterface, NoRouter, each with one line; ModuleNotFoundError without
-    the extra `can`.
+    Raises BadMap, FileNotFoundError, NoInterface, NoRouter, OtherSender, each with one line;
+    ModuleNotFoundError without the extra `can`.
     """
     checked_host(settings.id)
     sensors = () if settings.sensors is None else read_sensors(settings.sensors, settings.dbc)
@@ -85,32 +85,42 @@ class _Service:
         self._sender: ArmSender | None = None
         self._send_s = self._beat_s = 0.0
         if table is not None:
-            self._sender = ArmSender(bus, settings.room, table, settings.origins, fd=settings.port.fd)
+            self._sender = ArmSender(
+                bus, settings.room, table, settings.origins, fd=settings.port.fd, echoes=port.echoes
+            )
             self._send_s = 1.0 / table.rate_hz
 
     def run(self, stop: threading.Event) -> None:
-        """Take frames as they come; look after everything else at its time."""
+        """Take frames as they come; look after everything else at its time. Raises OtherSender."""
+        try:
+            self._serve(stop)
+        finally:
+            self._end()
+
+    def _serve(self, stop: threading.Event) -> None:
         receive = self._port.receive
         taken = (lambda _number, _data, _now_ns: None) if self._imus is None else self._imus.receive
+        sender = self._sender
         host_ns = self._clock.at(0)
         look_s = send_s = due_s = now_s = time.monotonic()
         while not stop.is_set():
             frame = receive(due_s - now_s)
             now_ns = time.monotonic_ns()
             if frame is not None:
+                if sender is not None:
+                    sender.hear(*frame)
                 taken(frame[0], frame[1], host_ns + now_ns)
             now_s = 1e-9 * now_ns
             if now_s < due_s:
                 continue
-            if self._sender is not None and now_s >= send_s:
-                self._sender.tick(self._port)
+            if sender is not None and now_s >= send_s:
+                sender.tick(self._port)
                 send_s = max(send_s + self._send_s, now_s)  # late frames are left out, not caught up
             if now_s >= look_s:
                 look_s = now_s + LOOK_S
                 self._look()
-            due_s = look_s if self._sender is None else min(look_s, send_s)
+            due_s = look_s if sender is None else min(look_s, send_s)
             now_s = min(time.monotonic(), due_s)
-        self._end()
 
     def _look(self) -> None:
         if self._imus is not None:
