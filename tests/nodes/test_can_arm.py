@@ -14,7 +14,7 @@ from brachium_nodes.can import arm_frames
 from brachium_nodes.can.arm_frames import ArmValue, JointValue, Reason
 from brachium_nodes.can.arm_output import SILENCE_NS, ArmOutput
 from brachium_nodes.can.joint_table import JOINTS, JointRow, JointTable, read_joints
-from brachium_nodes.can.map_files import BadMap
+from brachium_nodes.can.toml_records import BadMap
 from brachium_wire.messages import Calibration, Quality, SegmentPose, Skeleton
 
 FILE = Path(arm_frames.__file__).with_name("brachium_arm.dbc")
@@ -271,7 +271,14 @@ def test_a_standard_deviation_beyond_the_makers_limit_is_invalid_and_so_is_none(
         ("side = 'right'", "subject"),
         ("subject = 'p01'\n[joint.knee]", "'knee' is not known"),
         ("subject = 'p01'\nbase_id = 0x7FF", "no room"),
-        ("subject = 'p01'\n[joint.elbow_flexion]\nsign = 2", "sign"),
+        (
+            "subject = 'p01'\n[joint.elbow_flexion]\nsign = 2",
+            "joint elbow_flexion: sign 2 cannot be used; write -1 or 1$",
+        ),
+        ("subject = 'p01'\n[joint.elbow_flexion]\nzero = 2", "zero is not known; choose of sign, zero_deg, "),
+        ("subject = 'p01'\nside = 'up'", 'side .up. cannot be used; write "left" or "right"$'),
+        ("subject = 'p01'\njoint = 1", r"a table \[joint.NAME\] for each"),
+        ("subject = 'p01'\nsubject", "cannot be read as TOML"),
         ("subject = 'p01'\nrate_hz = 5", "20 to 200"),
         ("subject = 'p01'\nmax_age_ms = 5000", "10 to 500"),
         ("subject = 'p01'\nmax_sd_deg = nan", "more than 0"),

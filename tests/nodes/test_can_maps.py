@@ -9,9 +9,10 @@ from cantools.database.conversion import BaseConversion
 from hypothesis import given
 from hypothesis import strategies as st
 
-from brachium_nodes.can.map_files import SHIPPED, BadMap, SensorMap, read_toml
+from brachium_nodes.can.map_files import SHIPPED, SensorMap
 from brachium_nodes.can.sensor_map import read_sensors
 from brachium_nodes.can.signals import ShortFrame, reader
+from brachium_nodes.can.toml_records import BadMap, read_toml
 
 TABLE = '[[sensor]]\nid = "s"\nmap = "{map}"\nsubject = "p01"\nsegment = "forearm_r"\n'
 
@@ -100,12 +101,38 @@ signals = ["GyrX", "GyrY", "GyrZ"]
             OWN.replace("[angular_rate]", "[field]"),
             "acceleration. and .angular",
         ),
-        (TABLE.format(map="mti-600").replace("forearm_r", "knee"), OWN, "segment 'knee' is not known"),
+        (TABLE.format(map="mti-600").replace("forearm_r", "knee"), OWN, "segment 'knee' of s is not known"),
         (TABLE.format(map="mti-600") + "mounting = [2, 0, 0, 0]", OWN, "no quaternion of length 1"),
         (TABLE.format(map="mti-600") + "add_to_ids = 0x7FF", OWN, "that is no CAN id"),
         (TABLE.format(map="mti-600") + "rate_hz = 0.1", OWN, "write 1 to 2000"),
         (TABLE.format(map="mti-600") + "rate_hz = 0", OWN, "write 1 to 2000"),
-        (TABLE.format(map="mti-600") + "colour = 1", OWN, "colour"),
+        (
+            TABLE.format(map="mti-600") + "colour = 1",
+            OWN,
+            "sensor s: colour is not known; choose of id, map, ",
+        ),
+        (
+            TABLE.format(map="mti-600") + 'heading_free = "no"',
+            OWN,
+            "sensor s: heading_free 'no' cannot be used; write true or false$",
+        ),
+        (
+            TABLE.format(map="mti-600") + "mounting = [1, 0, 0]",
+            OWN,
+            r"sensor s: mounting \[1, 0, 0\] cannot be used; write 4 numbers in brackets, as \[1, 0, 0, 0\]$",
+        ),
+        (
+            TABLE.format(map="mti-600") + '[[sensor]]\nid = "t"',
+            OWN,
+            "sensor t: map is missing; write a text in quotes$",
+        ),
+        ('[[sensor]]\nmap = "mti-600"', OWN, "sensor 1: id is missing"),
+        ("[sensor]", OWN, r"write a table \[\[sensor\]\] for each$"),
+        (
+            TABLE.format(map="own.toml"),
+            OWN + '[key]\ntick_s = "x"',
+            "key: signals is missing; write names in",
+        ),
         (2 * TABLE.format(map="mti-600"), OWN, "both send 0x"),
         (TABLE.format(map="mti-600") + TABLE.format(map="lpms-orientation"), OWN, "there twice"),
         ("sensor = []", OWN, "no .*sensor"),
@@ -130,3 +157,7 @@ def test_a_database_of_the_user_replaces_the_maps(tmp_path: Path):
     bad.write_text("BO_ nonsense")
     with pytest.raises(BadMap, match="cannot be read as a CAN database"):
         read_sensors(path, bad)
+    empty = tmp_path / "empty.dbc"
+    empty.write_text('VERSION ""\n')
+    with pytest.raises(BadMap, match=r"empty.dbc describes no message at all; give the DBC"):
+        read_sensors(path, empty)

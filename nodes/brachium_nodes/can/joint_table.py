@@ -1,13 +1,12 @@
 """The machine maker's table: whose arm goes out, on which ids, and how an angle becomes the machine's."""
 
-import tomllib
 from math import isfinite
 from pathlib import Path
 from typing import Literal
 
 import msgspec
 
-from brachium_nodes.can.map_files import BadMap
+from brachium_nodes.can.toml_records import BadMap, read_toml
 from brachium_wire import keys
 
 JOINTS = (
@@ -57,10 +56,7 @@ class JointTable(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_field
 
 def read_joints(path: Path) -> JointTable:
     """Return a maker's table. Raises BadMap, FileNotFoundError."""
-    try:
-        table = msgspec.convert(tomllib.loads(path.read_text("utf-8")), JointTable)
-    except (tomllib.TOMLDecodeError, msgspec.ValidationError, UnicodeDecodeError) as error:
-        raise BadMap(f"{path}: {error}") from None
+    table = read_toml(path, JointTable)
     keys.subject_chunk(table.subject)
     unknown = set(table.joint) - set(JOINTS)
     if unknown:

@@ -1,22 +1,17 @@
 """The files that say which frames are which sensor: a map, a sensor table, a CAN database. Read and typed."""
 
-import tomllib
 from functools import cache
 from pathlib import Path
-from typing import Any, Literal, TypeVar, get_args
+from typing import Any, Literal, get_args
 
 import msgspec
 
+from brachium_nodes.can.toml_records import BadMap
 from brachium_wire.messages import Quaternion
 
 SHIPPED = Path(__file__).parent / "maps"
 Quantity = Literal["acceleration", "angular_rate", "field", "quaternion"]
 QUANTITIES: tuple[Quantity, ...] = get_args(Quantity)
-T = TypeVar("T")
-
-
-class BadMap(ValueError):
-    """A map, a sensor table or a DBC says something that cannot be; the text says what to write."""
 
 
 class Signals(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -94,16 +89,11 @@ def read_database(path: Path) -> Any:
     if not path.is_file():
         raise FileNotFoundError(2, "no such DBC", str(path))
     try:
-        return database.load_file(path)
+        read: Any = database.load_file(path)
     except (Error, ValueError) as error:
         raise BadMap(
             f"{path} cannot be read as a CAN database: {' '.join(str(error).split())[:200]}"
         ) from None
-
-
-def read_toml(path: Path, kind: type[T]) -> T:
-    """Return a TOML file as a record, or raise BadMap."""
-    try:
-        return msgspec.convert(tomllib.loads(path.read_text("utf-8")), kind)
-    except (tomllib.TOMLDecodeError, msgspec.ValidationError, UnicodeDecodeError) as error:
-        raise BadMap(f"{path}: {error}") from None
+    if not read.messages:
+        raise BadMap(f"{path} describes no message at all; give the DBC that came with the sensor")
+    return read

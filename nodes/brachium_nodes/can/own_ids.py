@@ -1,4 +1,4 @@
-"""Whether somebody else sends with the ids of our arm. Of two senders no machine could tell which is right."""
+"""Does somebody else send with the ids of our arm: of two senders no machine could tell who is right."""
 
 from collections import deque
 

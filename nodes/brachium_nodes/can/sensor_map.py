@@ -14,13 +14,12 @@ from brachium_body.segments import SEGMENTS
 from brachium_nodes.can.grouping import TIMEOUT_NS, Key
 from brachium_nodes.can.map_files import (
     SHIPPED,
-    BadMap,
     SensorEntry,
     SensorMap,
     SensorTable,
     read_database,
-    read_toml,
 )
+from brachium_nodes.can.toml_records import BadMap, read_toml
 from brachium_wire import keys
 from brachium_wire.messages import Quaternion
 
@@ -61,7 +60,9 @@ def _sensor(path: Path, entry: SensorEntry, dbc: Path | None) -> CanSensor:
     keys.chunk(entry.id, f"{path}: id")
     keys.subject_chunk(entry.subject)
     if entry.segment not in SEGMENTS:
-        raise BadMap(f"{path}: segment {entry.segment!r} is not known; choose one of {', '.join(SEGMENTS)}")
+        raise BadMap(
+            f"{path}: segment {entry.segment!r} of {entry.id} is not known; choose of {', '.join(SEGMENTS)}"
+        )
     if entry.mounting is not None and not 0.999 < sum(v * v for v in entry.mounting) < 1.001:
         raise BadMap(f"{path}: mounting of {entry.id} {list(entry.mounting)} is no quaternion of length 1")
     place = _map_path(path, entry.map)
