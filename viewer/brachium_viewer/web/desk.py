@@ -70,8 +70,10 @@ class Desk:
             case r.Stop():
                 return await self._end(subject, "stopped")
             case r.PatientStop():
+                ended = await self._end(subject, "patient-stop", none_is_fine=True)
+                self._state.stopped = asked.reason  # every screen is told, whatever becomes of the recording
                 await self._mark(subject, marks.PatientStop(reason=asked.reason))
-                return await self._end(subject, "patient-stop", none_is_fine=True)
+                return ended
             case r.Report():
                 return await self._finish(subject)
             case r.Mark():

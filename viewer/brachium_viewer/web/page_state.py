@@ -45,6 +45,8 @@ class PageState:
         self.room, self.subject = room, subject
         self.network = Network()
         self.running: RunningSet | None = None
+        self.stopped: str | None = None
+        """Why the patient stopped; until a set begins or somebody else is shown."""
         self._subjects: dict[str, _Subject] = {}
         self._drawn: dict[str, tuple[int, bool]] = {}
         self._progress: tuple[int, Json] | None = None
@@ -81,7 +83,7 @@ class PageState:
         keys.subject_chunk(subject)
         if self.running is not None and subject != self.subject:
             raise ValueError(f"a set of {self.subject} is running: stop it first")
-        self.subject, self._drawn = subject, {}
+        self.subject, self._drawn, self.stopped = subject, {}, None
 
     def begin(self, begins: ExerciseBegins, from_ns: int) -> None:
         """Count a set from now on. Raises ValueError when one runs or nobody is chosen."""
@@ -89,7 +91,7 @@ class PageState:
             raise ValueError("no subject is chosen")
         if self.running is not None:
             raise ValueError("a set is running: stop it first")
-        self.running, self._progress = RunningSet(begins, from_ns), None
+        self.running, self._progress, self.stopped = RunningSet(begins, from_ns), None, None
 
     def end(self) -> Json | None:
         """Count no more; return where the set stood, or None when none ran."""
@@ -154,6 +156,7 @@ class PageState:
             "sides": self.sides(),
             "calibration": frames.calibration(subject.calibration),
             "session": frames.session(subject.session),
+            "stopped": self.stopped,
             "set": None if running is None else frames.running(running.begins, running.from_ns),
         }
 

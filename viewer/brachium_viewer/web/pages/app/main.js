@@ -86,6 +86,7 @@ function recording() {
   const time = `${Math.floor((seconds ?? 0) / 60)}:${String((seconds ?? 0) % 60).padStart(2, "0")}`;
   $("recording").textContent = say("recording", { time });
   const alarms = state.alarms.map(({ what, reason }) => say(`alarm.${what}`, { reason }));
+  if (state.stopped) alarms.unshift(say("alarm.stopped", { reason: say(`patient.reason.${state.stopped}`) }));
   renew($("alarm"), alarms.join(), () => alarms.map((text) => make("p", {}, text)));
 }
 
