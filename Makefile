@@ -27,7 +27,7 @@ check: $(VENV)/dev.stamp
 	$(BIN)/lint-imports
 
 pytest: $(VENV)/dev.stamp
-	$(BIN)/python -m pytest $(ARGS)
+	$(BIN)/python -m pytest -n 2 --dist loadfile $(ARGS)
 
 prove: $(VENV)/demo.stamp
 	$(BIN)/brachium prove --out docs/figures $(ARGS)
