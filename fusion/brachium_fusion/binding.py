@@ -58,25 +58,27 @@ class Binding:
         self._refresh(known, revision)
         if not self._rests:
             return Bound(readings, {}, [])
-        motions = self._motions(now, readings, known)
+        followed = _bridged(now, readings, known)
+        motions = self._motions(now, followed, known)
         result, shifts, slips = dict(readings), dict[Side, Shift](), list[Slip]()
         for side, (_, arm) in self._arms.items():
             if not arm.segments:
                 continue
             sensors = {
-                segment: SensorNow(_turned(known.alignment, segment, readings[segment]), motions[segment])
+                segment: SensorNow(_turned(known.alignment, segment, followed[segment]), motions[segment])
                 for segment in arm.segments
                 if segment in motions
             }
             found = arm.step(now, sensors, self._rests)
-            if found.shift is not None:
+            if found.shift is not None and not any(readings[s] is None for s in arm.shoulder_segments):
                 shifts[side] = found.shift
             if found.slip is not None:
                 slips.append(found.slip)
                 self._slipped.add(found.slip.segment)
             for segment, turned in found.world_from_sensor.items():
                 reading = readings[segment]
-                assert reading is not None
+                if reading is None:
+                    continue
                 q = _about_up(-_turn(known.alignment, segment), turned)
                 result[segment] = reading._replace(before=q, after=q, fraction=0.0)
         for segment in self._slipped:
@@ -98,7 +100,7 @@ class Binding:
         for segment, rest in self._rests.items():
             motion = None
             if readings.get(segment) is not None:
-                motion = known.tracks[segment].timeline.motion_at(now)
+                motion = known.tracks[segment].timeline.motion_at(now, unseen=True)
             if motion is None:
                 rest.see(np.zeros(3), still=False)
             else:
@@ -149,6 +151,17 @@ class Binding:
         self._slipped = set(state["slipped"])
         for segment, rest in self._rests.items():
             rest.restore(state["rests"][segment])
+
+
+def _bridged(now: int, readings: Readings, known: Known) -> Readings:
+    """Return the readings with those in gaps that are bridged but not shown: who follows a sensor sample by
+    sample goes on through them."""
+    if None not in readings.values():
+        return readings
+    return {
+        s: known.tracks[s].timeline.at(now, unseen=True) if reading is None else reading
+        for s, reading in readings.items()
+    }
 
 
 def _turned(alignment: Alignment | None, segment: str, reading: Reading | None) -> Floats:

@@ -17,7 +17,8 @@ from brachium_fusion.sensor_to_segment import Span, align_segments
 from brachium_fusion.session_terms import check_session
 from brachium_fusion.settings import Settings
 from brachium_fusion.subject import Subject
-from brachium_fusion.uniform import Series
+from brachium_fusion.track import CARRIED_NS
+from brachium_fusion.uniform import NEAR, Series
 from brachium_wire.capture import Capture, CaptureSegment
 from brachium_wire.messages import Info, SensorCalibration, Session
 from brachium_wire.samples import Samples
@@ -27,7 +28,10 @@ Floats = npt.NDArray[np.float64]
 SUBJECT = "capture"
 ZERO_NS = 1_000_000_000_000_000
 """Host time given to t = 0 of a capture, so that times are positive whatever its t."""
-BATCH = 16
+BATCH_S = 0.1
+"""A batch is as long as a node's: what waits for a sensor waits longer than this."""
+SURE_GAP = 2.5
+"""Periods: in a longer time than this a sample is missing, however its neighbours lie."""
 FREE_S = 120.0
 """Where movements are led, or only movement can tell the headings, all of it up to so long after the pose is
 looked at beside what is stated: it shows heading, centre and range of the joints."""
@@ -80,7 +84,7 @@ def material(capture: Capture) -> Material:
             for name, data in capture.segments.items()
         },
         infos=infos(capture),
-        sequences={name: np.arange(len(data.t)) for name, data in capture.segments.items()},
+        sequences={name: numbers(data) for name, data in capture.segments.items()},
         session=session(capture),
         spans=_timed(capture),
         stated=stated(capture),
@@ -143,7 +147,7 @@ def solve(capture: Capture, settings: Settings, times_s: Floats) -> tuple[Pipeli
         alignment = told_of(_alignment(capture, settings), away)
     pipeline = Pipeline(settings)
     subject = pipeline.subject(SUBJECT)
-    _begin(subject, capture, nanoseconds(times_s).tolist())
+    _begin(subject, capture, nanoseconds(times_s).tolist(), nanoseconds(_left_out(times_s)).tolist())
     subject.calibrating.alignment = alignment
     subject.calibrating.reference_ns = int(nanoseconds(_start(capture)))
     for segment, samples in batches(capture):
@@ -152,23 +156,53 @@ def solve(capture: Capture, settings: Settings, times_s: Floats) -> tuple[Pipeli
     return pipeline, alignment
 
 
+def numbers(data: CaptureSegment) -> npt.NDArray[np.int64]:
+    """Return the samples' numbers (n,) as the sensor may have counted them, missing ones included.
+
+    Times that jitter are no gap: an interval that is too long by up to a period and a half, and made up for
+    by one beside it, misses nothing.
+    """
+    periods = np.diff(data.t) * data.rate_hz
+    missing = np.maximum(np.round(periods) - 1.0, 0.0).astype(np.int64)
+    with_next, with_last = np.full((2, len(periods)), np.inf)
+    with_next[:-1] = with_last[1:] = periods[:-1] + periods[1:]
+    made_up = np.minimum(with_next, with_last) <= SURE_GAP
+    missing[(periods <= NEAR) | (made_up & (periods <= SURE_GAP))] = 0
+    return np.concatenate([[0], np.cumsum(missing + 1)])
+
+
+def _left_out(times_s: Floats) -> Floats:
+    """Return instants in the short gaps of a capture's own: who follows its sensors sample by sample goes
+    through them."""
+    if len(times_s) < 2:
+        return times_s[:0]
+    steps = np.diff(times_s)
+    period = float(np.median(steps))
+    short = np.flatnonzero((steps > NEAR * period) & (steps <= 1e-9 * CARRIED_NS))
+    gaps = [times_s[i] + np.arange(1, round(steps[i] / period)) * period for i in short.tolist()]
+    return np.concatenate([times_s[:0], *gaps])
+
+
 def batches(capture: Capture, until_s: float | None = None) -> Iterator[tuple[str, Samples]]:
     """Yield all segments' samples in small batches, in order of their last sample's time. A gap in time
     never lies
     within a batch."""
     pieces: list[tuple[float, Segment, int, int]] = []
+    counted: dict[str, npt.NDArray[np.int64]] = {}
     for segment, data in capture.segments.items():
-        breaks = np.flatnonzero(np.diff(data.t) > 2.5 / data.rate_hz) + 1
-        edges = np.unique(np.concatenate([np.arange(0, len(data.t), BATCH), breaks, [len(data.t)]]))
+        sequence = counted[segment] = numbers(data)
+        breaks = np.flatnonzero(np.diff(sequence) > 1) + 1
+        regular = np.arange(0, len(data.t), max(1, round(BATCH_S * data.rate_hz)))
+        edges = np.unique(np.concatenate([regular, breaks, [len(data.t)]]))
         for start, end in zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True):
             pieces.append((float(data.t[end - 1]), segment, start, end))
     for last, segment, start, end in sorted(pieces):
         if until_s is not None and last > until_s + 1.0:
             return
-        yield segment, _samples(capture.segments[segment], start, end)
+        yield segment, _samples(capture.segments[segment], start, end, counted[segment])
 
 
-def _samples(data: CaptureSegment, start: int, end: int) -> Samples:
+def _samples(data: CaptureSegment, start: int, end: int, counted: npt.NDArray[np.int64]) -> Samples:
     times = nanoseconds(data.t[start:end])
     mag, index = None, None
     if data.mag is not None:
@@ -177,7 +211,7 @@ def _samples(data: CaptureSegment, start: int, end: int) -> Samples:
         if not there.all():
             mag, index = np.ascontiguousarray(mag[there]), tuple(np.flatnonzero(there).tolist())
     return Samples(
-        sequence=start,
+        sequence=int(counted[start]),
         time_ns=times.tolist(),
         device_us=0,
         device_offsets=b"",
@@ -196,10 +230,10 @@ def _start(capture: Capture) -> float:
     return min(float(data.t[0]) for data in capture.segments.values())
 
 
-def _begin(subject: Subject, capture: Capture, instants: Sequence[int]) -> None:
+def _begin(subject: Subject, capture: Capture, instants: Sequence[int], between: Sequence[int] = ()) -> None:
     subject.session = session(capture)
     subject.stated = stated(capture)
-    subject.use_instants(instants)
+    subject.use_instants(instants, between)
     for segment, info in infos(capture).items():
         subject.inform(segment, info)
 
@@ -217,6 +251,7 @@ def _alignment(capture: Capture, settings: Settings) -> Alignment | None:
             spans.append(whole)
     subject = Subject(replace(settings, joints=False), lambda _: None)
     times = output_times(capture, None)
+    times = np.sort(np.concatenate([times, _left_out(times)]))
     wanted = times[times <= end_s + 1e-9]
     _begin(subject, capture, nanoseconds(wanted).tolist())
     record = MotionRecord()

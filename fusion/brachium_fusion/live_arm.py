@@ -85,6 +85,12 @@ class LiveArm:
         trunk = () if self._trunk is None else ("sternum",)
         return (*trunk, self._upper, self._forearm, self._hand)
 
+    @property
+    def shoulder_segments(self) -> tuple[str, ...]:
+        """Of whose sensors the shoulder's shift is made."""
+        trunk = () if self._trunk is None else ("sternum",)
+        return (*trunk, self._upper, self._forearm)
+
     def heading_sd(self, joint: str) -> float | None:
         """Return the standard deviation of the heading across `elbow` or `wrist`, rad; None: unknown."""
         found = self._joints.get(joint)

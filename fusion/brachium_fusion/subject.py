@@ -59,6 +59,7 @@ class Subject:
         self._settings = settings
         self._period_ns = round(1e9 / settings.rate_hz)
         self._times: deque[int] | None = None
+        self._between: frozenset[int] = frozenset()
         self._next_ns: int | None = None
         self._ended = False
         self._pending: list[Change] = []
@@ -179,9 +180,10 @@ class Subject:
         """Return the changes whose instant has not come."""
         return list(self._pending)
 
-    def use_instants(self, times_ns: Sequence[int]) -> None:
-        """Solve at these instants instead of the grid."""
-        self._times = deque(times_ns)
+    def use_instants(self, times_ns: Sequence[int], between: Sequence[int] = ()) -> None:
+        """Solve at these instants instead of the grid; go through those `between` without giving them."""
+        self._times = deque(sorted({*times_ns, *between}))
+        self._between = frozenset(between) - frozenset(times_ns)
         if len(times_ns) > 1:
             self.binding.rate_hz = 1e9 / float(np.median(np.diff(times_ns)))
 
@@ -214,6 +216,9 @@ class Subject:
                 readings, shifts, slips = self.binding.correct(now, readings, self._known(), self.revision)
                 for slip in slips:
                     self.calibrating.warn(now, slip.text)
+            solved = now
+            if now in self._between:
+                continue
             yield Instant(
                 now,
                 readings,
@@ -222,7 +227,6 @@ class Subject:
                 self.session,
                 shifts,
             )
-            solved = now
         if solved is not None:
             for track in self.tracks.values():
                 track.timeline.forget(self._next_ns or solved)

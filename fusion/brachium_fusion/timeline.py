@@ -1,6 +1,6 @@
 """What a sensor showed over the last moments: orientation and motion at any instant between samples. Pure."""
 
-from bisect import bisect_left
+from bisect import bisect_left, bisect_right
 from collections import deque
 from dataclasses import dataclass
 from math import acos, sin, sqrt
@@ -86,6 +86,19 @@ class Moved:
         return self._joined
 
 
+class Carried(NamedTuple):
+    """The last sample before a gap, and the missing ones as they probably were."""
+
+    times: list[int]
+    quats: Floats
+    rows: Floats
+    """(n, 6) gyr and acc."""
+
+    def state(self) -> list[Any]:
+        """Return it as plain values."""
+        return [self.times, self.quats.ravel().tolist(), self.rows.ravel().tolist()]
+
+
 @dataclass(slots=True, eq=False)
 class Block:
     """A batch after the filter, and the last sample before it."""
@@ -102,6 +115,25 @@ class Block:
     gap: Quality | None
     """What an instant before its first sample is: held, missing, or None where there is no gap."""
     disturbed: bool
+    carried: Carried | None = None
+    """Of the gap before it, when that was bridged."""
+
+    def shows(self, time_ns: int, *, unseen: bool) -> bool:
+        """Return whether something is known of an instant before the first sample."""
+        if self.before_ns == 0 or time_ns < self.before_ns:
+            return False
+        return self.gap != "missing" or (unseen and self.carried is not None)
+
+    def before_first(self, time_ns: int) -> tuple[int, int, Floats, Floats]:
+        """Return what lies around an instant between the last sample before it and its first one: times and
+        orientations."""
+        if self.carried is None:
+            return self.before_ns, self.times[0], self.before, self.quats[0]
+        times, quats, _ = self.carried
+        i = bisect_right(times, time_ns)
+        if i < len(times):
+            return times[i - 1], times[i], quats[i - 1], quats[i]
+        return times[-1], self.times[0], quats[-1], self.quats[0]
 
 
 class Timeline:
@@ -133,33 +165,36 @@ class Timeline:
                 return block
         return None
 
-    def at(self, time_ns: int) -> Reading | None:
-        """Return the orientation at an instant up to `last_ns`, or None where nothing was measured."""
+    def at(self, time_ns: int, *, unseen: bool = False) -> Reading | None:
+        """Return the orientation at an instant up to `last_ns`, or None where nothing was measured.
+
+        `unseen`: also in a gap that was bridged although it is too long to be shown.
+        """
         block = self._block_at(time_ns)
         if block is None:
             return None
         quality: Quality = "disturbed" if block.disturbed else "good"
         after = bisect_left(block.times, time_ns)
-        t1 = block.times[after]
+        t1, behind = block.times[after], block.quats[after]
         if after > 0:
             t0, before = block.times[after - 1], block.quats[after - 1]
         elif time_ns == t1:
             t0, before = t1, block.quats[0]
-        elif block.before_ns == 0 or time_ns < block.before_ns or block.gap == "missing":
+        elif not block.shows(time_ns, unseen=unseen):
             return None
         else:
-            t0, before = block.before_ns, block.before
+            t0, t1, before, behind = block.before_first(time_ns)
             quality = block.gap or quality
         return Reading(
             before,
-            block.quats[after],
+            behind,
             (time_ns - t0) / (t1 - t0) if t1 > t0 else 1.0,
             quality,
             block.first_sequence + after,
             block.received_ns,
         )
 
-    def motion_at(self, time_ns: int) -> Motion | None:
+    def motion_at(self, time_ns: int, *, unseen: bool = False) -> Motion | None:
         """Return rate and force on the straight line between the samples around an instant.
 
         None where `at` gives nothing, and for a sensor that delivers orientation only.
@@ -171,10 +206,18 @@ class Timeline:
         after = bisect_left(block.times, time_ns)
         t1, value = block.times[after], rows[after + 1]
         if time_ns < t1:
-            t0 = block.times[after - 1] if after > 0 else block.before_ns
-            if after == 0 and (t0 == 0 or time_ns < t0 or block.gap == "missing"):
+            if after > 0:
+                t0, before = block.times[after - 1], rows[after]
+            elif not block.shows(time_ns, unseen=unseen):
                 return None
-            before = rows[after]
+            elif block.carried is None:
+                t0, before = block.before_ns, rows[0]
+            else:
+                times, _, carried = block.carried
+                i = bisect_right(times, time_ns)
+                t0, before = times[i - 1], carried[i - 1]
+                if i < len(times):
+                    t1, value = times[i], carried[i]
             value = before + (time_ns - t0) / (t1 - t0) * (value - before)
         return Motion(value[:3], value[3:])
 
@@ -212,6 +255,7 @@ class Timeline:
                 b.received_ns,
                 b.gap,
                 b.disturbed,
+                None if b.carried is None else b.carried.state(),
             ]
             for b in self._blocks
         ]
@@ -225,11 +269,33 @@ class Timeline:
                 times,
                 np.array(quats).reshape(-1, 4),
                 None if rows is None else _moved(np.array(rows).reshape(-1, 6)),
-                *rest,
+                sequence,
+                received_ns,
+                gap,
+                disturbed,
+                _carried(carried[0]) if carried else None,
             )
-            for before_ns, before, times, quats, rows, *rest in state
+            for (
+                before_ns,
+                before,
+                times,
+                quats,
+                rows,
+                sequence,
+                received_ns,
+                gap,
+                disturbed,
+                *carried,
+            ) in state
         )
 
 
 def _moved(rows: Floats) -> Moved:
     return Moved(rows[1:, :3], rows[1:, 3:], (rows[:1, :3], rows[:1, 3:]))
+
+
+def _carried(state: list[Any] | None) -> Carried | None:
+    if state is None:
+        return None
+    times, quats, rows = state
+    return Carried(times, np.reshape(quats, (-1, 4)), np.reshape(rows, (-1, 6)))

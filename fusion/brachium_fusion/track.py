@@ -7,9 +7,10 @@ import numpy as np
 import numpy.typing as npt
 
 from brachium_body import rotation
+from brachium_fusion.bridging import SIDE, bridge
 from brachium_fusion.calibrated import Calibrated
 from brachium_fusion.orientation import FilterName, OrientationFilter, make
-from brachium_fusion.timeline import Block, Moved, Timeline
+from brachium_fusion.timeline import Block, Carried, Moved, Timeline
 from brachium_wire.codec import Drop
 from brachium_wire.messages import Info, Quality
 from brachium_wire.samples import Samples
@@ -19,6 +20,9 @@ Floats = npt.NDArray[np.float64]
 
 BRIDGE_NS = 100_000_000
 """A gap up to this is bridged by interpolation when its far end is there, and marked held."""
+CARRIED_NS = 150_000_000
+"""What was bridged of a gap up to this is kept for those who follow a sensor sample by sample; nobody waits
+for the far end of a longer one."""
 RESTART_NS = 500_000_000
 """After a longer gap the filter starts anew: what it would carry over is further off than a fresh start."""
 SETTLE_NS = 5_000_000_000
@@ -47,7 +51,7 @@ class SegmentTrack:
         self._filter = self._new_filter()
         self.timeline = Timeline()
         self._last: tuple[Floats, Floats] | None = None
-        """gyr and acc of the last sample."""
+        """gyr and acc of the last samples, at least one."""
         self._disturbed_since: int | None = None
         self._settled_ns = 0
         self.restarts = 0
@@ -104,6 +108,7 @@ class SegmentTrack:
         mag = None if samples.mag is None else self._calibrated.mag(samples.mag)
         silence = samples.time_ns[0] - self.last_ns if self.timeline else 0
         kind: Quality | None = None
+        carried: Carried | None = None
         period_ns = 1e9 / self.info.rate_hz
         missing = round(silence / period_ns) - 1 if gap or silence > 2.5 * period_ns else 0
         if missing > 0 and self.timeline:
@@ -114,20 +119,31 @@ class SegmentTrack:
                 self._filter = self._new_filter()
                 self.restarts += 1
             else:
-                self._bridge(gyr[0], acc[0], missing)
+                carried = self._bridge(gyr, acc, missing, samples.time_ns[0])
         quats = self._filter.update(gyr, acc, mag, samples.mag_index)
         moved = Moved(gyr, acc, self._last)
-        self._last = gyr, acc
+        self._last = _newest(self._last, gyr, acc) if len(gyr) < SIDE else (gyr, acc)
         self._note_still(gyr, samples.time_ns)
-        self._append(samples, quats, moved, kind, self._is_disturbed(samples.time_ns[-1]))
+        self._append(samples, quats, moved, kind, self._is_disturbed(samples.time_ns[-1]), carried)
 
-    def _bridge(self, gyr: Floats, acc: Floats, missing: int) -> None:
-        """Carry the filter over missing samples along a straight line between the ends of the gap."""
+    def _bridge(self, gyr: Floats, acc: Floats, missing: int, until_ns: int) -> Carried | None:
+        """Carry the filter over missing samples, along a straight line where the gap is too long to be
+        waited for. Return what was found of one that is."""
         assert self._last is not None
-        last_gyr, last_acc = self._last[0][-1], self._last[1][-1]
-        part = (np.arange(1, missing + 1) / (missing + 1.0))[:, None]
-        self._filter.update(
-            last_gyr + part * (gyr - last_gyr), last_acc + part * (acc - last_acc), None, None
+        waited_for = until_ns - self.last_ns <= CARRIED_NS
+        side = SIDE if waited_for else 1
+        before = np.hstack([self._last[0][-side:], self._last[1][-side:]])
+        rows = bridge(before, np.hstack([gyr[:side], acc[:side]]), missing)
+        columns = np.ascontiguousarray(rows[:, :3]), np.ascontiguousarray(rows[:, 3:])
+        quats = self._filter.update(*columns, None, None)
+        if not waited_for:
+            return None
+        self._last = _newest(self._last, rows[:, :3], rows[:, 3:])
+        step = (until_ns - self.last_ns) / (missing + 1)
+        return Carried(
+            [self.last_ns + round(step * i) for i in range(missing + 1)],
+            np.vstack([self.timeline.last.quats[-1:], quats]),
+            np.vstack([before[-1:], rows]),
         )
 
     def _feed_orientation(self, samples: Samples) -> None:
@@ -142,7 +158,7 @@ class SegmentTrack:
         previous = self.timeline.last.quats[-1] if self.timeline else quats[0]
         steps = rotation.angle_between(np.vstack([previous, quats[:-1]]), quats) * self.info.rate_hz
         self._note_still(np.column_stack([steps, np.zeros((len(steps), 2))]), samples.time_ns)
-        self._append(samples, quats, None, kind, disturbed=False)
+        self._append(samples, quats, None, kind, disturbed=False, carried=None)
 
     def _note_still(self, gyr: Floats, times: list[int]) -> None:
         if self.still_since_ns == 0:
@@ -167,7 +183,13 @@ class SegmentTrack:
         return now_ns - self._disturbed_since >= DISTURBED_NS
 
     def _append(
-        self, samples: Samples, quats: Floats, moved: Moved | None, gap: Quality | None, disturbed: bool
+        self,
+        samples: Samples,
+        quats: Floats,
+        moved: Moved | None,
+        gap: Quality | None,
+        disturbed: bool,
+        carried: Carried | None,
     ) -> None:
         before_ns, before = 0, quats[0]
         if self.timeline:
@@ -184,6 +206,7 @@ class SegmentTrack:
                 samples.received_ns,
                 gap,
                 disturbed,
+                carried,
             )
         )
 
@@ -200,7 +223,7 @@ class SegmentTrack:
             "blocks": self.timeline.state(),
             "last": None
             if self._last is None
-            else [*self._last[0][-1].tolist(), *self._last[1][-1].tolist()],
+            else np.hstack([one[-SIDE:] for one in self._last]).ravel().tolist(),
             "disturbed_since": self._disturbed_since,
             "settled_ns": self._settled_ns,
             "restarts": self.restarts,
@@ -215,6 +238,13 @@ class SegmentTrack:
         self.batch_ns, self.restarts, self.reboots = state["batch_ns"], state["restarts"], state["reboots"]
         self._filter.restore(state["filter"])
         self.timeline.restore(state["blocks"])
-        last = None if state["last"] is None else np.array([state["last"]])
+        last = None if state["last"] is None else np.reshape(state["last"], (-1, 6))
         self._last = None if last is None else (last[:, :3], last[:, 3:])
         self._disturbed_since, self._settled_ns = state["disturbed_since"], state["settled_ns"]
+
+
+def _newest(last: tuple[Floats, Floats] | None, gyr: Floats, acc: Floats) -> tuple[Floats, Floats]:
+    """Return the last samples there are."""
+    if last is None:
+        return gyr, acc
+    return np.vstack([last[0][-SIDE:], gyr])[-SIDE:], np.vstack([last[1][-SIDE:], acc])[-SIDE:]

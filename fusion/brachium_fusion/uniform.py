@@ -1,6 +1,7 @@
 """Samples of several sensors, each by its own clock, on one grid of time. Pure.
 
-Gaps up to 100 ms are bridged along a straight line; longer ones stay gaps, as rows of NaN.
+Gaps up to 100 ms are bridged by a curve through the samples on both sides; longer ones stay gaps, as rows of
+NaN.
 """
 
 from collections.abc import Mapping
@@ -10,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from brachium_body import rotation
+from brachium_fusion.bridging import curve
 
 Floats = npt.NDArray[np.float64]
 Bools = npt.NDArray[np.bool_]
@@ -77,12 +79,13 @@ def on_grid(series: Series, time_s: Floats) -> Uniform:
     if series.quat is not None:
         quat = rotation.slerp(series.quat[before], series.quat[after], part)
         quat[missing] = np.nan
+    held = gap & ~missing
     return Uniform(
-        gyr=_between(series.gyr, before, after, part, missing),
-        acc=_between(series.acc, before, after, part, missing),
+        gyr=_bridged(series.gyr, _between(series.gyr, before, after, part, missing), t, time_s, before, held),
+        acc=_bridged(series.acc, _between(series.acc, before, after, part, missing), t, time_s, before, held),
         mag=None if series.mag is None else _field(t, series.mag, time_s, missing),
         quat=quat,
-        held=gap & ~missing,
+        held=held,
         missing=missing,
         sample=np.searchsorted(t, time_s + slack) - 1,
     )
@@ -100,6 +103,22 @@ def _between(
     result: Floats = values[before] + part[:, None] * (values[after] - values[before])
     result[missing] = np.nan
     return result
+
+
+def _bridged(
+    values: Floats | None,
+    found: Floats,
+    t: Floats,
+    time_s: Floats,
+    before: npt.NDArray[np.intp],
+    held: Bools,
+) -> Floats:
+    """Put curves through two samples on both sides of gaps into what straight lines gave, in place."""
+    rows = np.flatnonzero(held & (before >= 1) & (before + 2 < len(t)))
+    if values is not None and len(rows):
+        nodes = before[rows][:, None] + np.arange(-1, 3)
+        found[rows] = curve(t[nodes], values[nodes], time_s[rows])
+    return found
 
 
 def _field(t: Floats, mag: Floats, time_s: Floats, missing: Bools) -> Floats | None:

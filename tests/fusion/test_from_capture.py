@@ -7,8 +7,10 @@ from scipy.spatial.transform import Rotation
 from brachium_body import rotation
 from brachium_body.angles import COLUMNS
 from brachium_body.segments import arm_segments
+from brachium_fusion.from_capture import batches, numbers
 from brachium_fusion.solve import SolveError, SolveSettings, run
 from brachium_wire import table
+from brachium_wire.capture import CaptureSegment, load
 
 RATE = 100.0
 UP = np.array([0.0, 0.0, 9.81])
@@ -229,3 +231,39 @@ def test_an_assumed_angle_that_no_arm_has_is_refused(made, tmp_path) -> None:
     folder = capture_folder(tmp_path / "c", made, toml="assumed_angles_deg = { knee_flexion = 30 }")
     with pytest.raises(ValueError, match="knee_flexion"):
         run(SolveSettings(input=folder, rate_hz=10.0))
+
+
+def at_times(t) -> CaptureSegment:
+    t = np.asarray(t, dtype=np.float64)
+    return CaptureSegment(t=t, rate_hz=RATE, acc=np.tile(UP, (len(t), 1)), gyr=np.zeros((len(t), 3)))
+
+
+def test_every_lost_sample_has_a_number_and_times_that_jitter_lose_none() -> None:
+    there = np.setdiff1d(np.arange(100), [7, 20, 22, 40, 41, 42, 43, 44])
+    assert numbers(at_times(there / RATE)).tolist() == there.tolist()
+    late = np.arange(100) / RATE
+    late[30] += 0.8 / RATE
+    late[50] -= 0.8 / RATE
+    assert numbers(at_times(late)).tolist() == list(range(100))
+    slow = np.arange(5000) * 1.01 / RATE
+    assert numbers(at_times(slow)).tolist() == list(range(5000))
+
+
+def test_samples_lost_one_by_one_are_bridged_and_cost_little(made, tmp_path) -> None:
+    random = np.random.default_rng(3)
+
+    def edit(_, columns):
+        keep = random.random(len(columns["t"])) > 0.05
+        keep[:2] = True
+        return {name: values[keep] for name, values in columns.items()}
+
+    toml = f"facing_deg = 0\n{POSE}"
+    whole = run(SolveSettings(input=capture_folder(tmp_path / "whole", made, toml=toml)))
+    holed = capture_folder(tmp_path / "holed", made, toml=toml, edit=edit)
+    capture = load(holed)
+    for segment, samples in batches(capture):
+        assert np.diff(samples.time_ns).max(initial=0) < 1.5e9 / RATE, segment
+    report = run(SolveSettings(input=holed))
+    assert report.drops == {}
+    assert report.rows == len(capture.segments["upper_arm_r"].t)
+    assert elbow_error_deg(report) < elbow_error_deg(whole) + 0.1

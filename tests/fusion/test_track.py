@@ -336,3 +336,56 @@ def test_motion_lies_on_the_line_between_calibrated_samples_and_nowhere_in_a_lon
         assert at(sample).acc == pytest.approx([0.01 * sample, 0.01 * sample, 2.0 * (9.81 + 0.01 * sample)])
     assert at(45.0).gyr[0] == pytest.approx(2.5)
     assert [at(s) for s in (-0.1, 19.5, 39.0, 49.1)] == [None] * 4
+
+
+def trembling(made, numbers):
+    """A sensor whose rate about the vertical is a tremor of 5 Hz, 50 samples a second: rad/s."""
+    gyr = np.zeros((len(numbers), 3))
+    gyr[:, 2] = np.sin(2.0 * np.pi * 5.0 * np.asarray(numbers) / 50.0)
+    return made.samples(
+        numbers[0],
+        gyr=gyr,
+        acc=np.tile(UP, (len(numbers), 1)),
+        times=[made.START + 20 * MS * i for i in numbers],
+    )
+
+
+def test_a_lost_sample_of_a_tremor_costs_an_eighth_of_what_a_straight_line_would(made) -> None:
+    numbers = np.arange(100)
+    errors = []
+    for lost in range(40, 50):
+        pieces = [list(numbers[:lost]), list(numbers[lost + 1 :])]
+        whole, _ = tracked(made, [trembling(made, list(numbers))], orientation_only=False, rate_hz=50.0)
+        holed, _ = tracked(made, [trembling(made, p) for p in pieces], orientation_only=False, rate_hz=50.0)
+        end = made.START + 99 * 20 * MS
+        errors.append(heading_at(holed, end) - heading_at(whole, end))
+    straight = 0.19 * 0.02 / np.sqrt(2.0)
+    assert np.sqrt(np.mean(np.square(errors))) < straight / 7.0
+
+
+def test_who_follows_a_sensor_goes_through_a_gap_that_is_waited_for_and_not_shown(made) -> None:
+    batches = [turning(made, 0, 100), turning(made, 113, 50)]
+    track, _ = tracked(made, batches, orientation_only=False)
+    inside = made.START + 1055 * MS
+    assert track.timeline.at(inside) is None
+    assert track.timeline.motion_at(inside) is None
+    through = track.timeline.at(inside, unseen=True)
+    before = heading_at(track, made.sample_times(99, 1)[0])
+    assert float(rotation.heading(solved(through))) == pytest.approx(before + 0.065, abs=1e-3)
+    assert track.timeline.motion_at(inside, unseen=True).gyr == pytest.approx([0.0, 0.0, 1.0])
+    long, _ = tracked(made, [turning(made, 0, 100), turning(made, 120, 50)], orientation_only=False)
+    assert long.timeline.at(inside, unseen=True) is None
+
+
+def test_what_was_bridged_is_part_of_the_state(made) -> None:
+    batches = [turning(made, 0, 1), turning(made, 1, 1), turning(made, 4, 1), turning(made, 7, 3)]
+    first, drops = tracked(made, batches[:3], orientation_only=False)
+    second = SegmentTrack(made.info(orientation_only=False), "auto", True)
+    second.restore(msgpack.unpackb(msgpack.packb(first.state())))
+    for track in (first, second):
+        track.feed(batches[3], drops)
+    for offset in (15, 25, 45, 55, 65, 85):
+        at = made.START + offset * MS
+        one, other = first.timeline.at(at), second.timeline.at(at)
+        assert np.array_equal(solved(one), solved(other))
+        assert np.array_equal(first.timeline.motion_at(at).acc, second.timeline.motion_at(at).acc)

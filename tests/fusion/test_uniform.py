@@ -54,3 +54,15 @@ def test_orientations_turn_evenly_between_samples() -> None:
     assert one.quat is not None
     assert 2.0 * np.arctan2(one.quat[:, 3], one.quat[:, 0]) == pytest.approx(instants)
     assert np.isnan(one.gyr).all()
+
+
+def test_a_lost_sample_of_a_tremor_lies_near_the_curve_of_its_neighbours() -> None:
+    t = np.arange(100) / 50.0
+    keep = np.ones(100, dtype=bool)
+    keep[10:90:7] = False
+    values = np.sin(2.0 * np.pi * 5.0 * t)[:, None] * LINE
+    one = on_grid(Series(time_s=t[keep], rate_hz=50.0, gyr=values[keep], acc=values[keep]), t)
+    assert one.held.sum() == (~keep).sum()
+    for found in (one.gyr, one.acc):
+        assert np.abs(found - values)[keep].max() < 1e-12
+        assert np.abs(found - values)[~keep].max() < 0.03 * np.abs(LINE).max()
