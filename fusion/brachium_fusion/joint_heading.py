@@ -13,11 +13,14 @@ import numpy as np
 from brachium_body import rotation
 from brachium_fusion.joint_matrices import Floats
 from brachium_fusion.joint_model import Interval, Joint
+from brachium_fusion.joint_shaking import SWING_RATE, TIP_M, Shaking
 from brachium_fusion.joint_update import GRAVITY
 
 HEADINGS = 72
 LEAST_ACCELERATION = 0.3
 """m/s^2: below it accelerometer bias and tilt error, not movement, give the direction."""
+ABOVE_SHAKING = 2.0
+"""Times the shaking: skin lets a sensor swing even against its bone, time and again in the same way."""
 ACCELERATION_SD = 0.3
 """m/s^2: lever arms, bias, tilt."""
 RATE_SD = 0.3
@@ -46,6 +49,7 @@ class HeadingSearch:
     def __init__(self, joint: Joint, forget_s: float = FORGET_S) -> None:
         self._joint, self._forget_s = joint, forget_s
         self.likelihood: Floats = np.zeros(HEADINGS)
+        self._shaking = Shaking()
 
     def take(self, attitude: Floats, rate: Floats, acceleration: Floats, span_s: float) -> None:
         """Take what both sensors saw over `span_s`: world_from_sensor (2, 3, 3), each with its own heading;
@@ -53,17 +57,21 @@ class HeadingSearch:
         """
         weight = min(1.0, span_s / ALIKE_S)
         self.likelihood = self.likelihood * (1.0 - span_s / self._forget_s)
+        self._shaking = self._shaking.then(acceleration)
+        shaken = self._shaking.squared
         if self._joint.has_levers:
             (ax, ay, _), (bx, by, _) = acceleration.tolist()
-            if min(ax * ax + ay * ay, bx * bx + by * by) > LEAST_ACCELERATION**2:
+            least = LEAST_ACCELERATION**2 + (ABOVE_SHAKING**2) * shaken
+            if min(ax * ax + ay * ay, bx * bx + by * by) > least:
                 along, across = ax * bx + ay * by, ay * bx - ax * by
                 gain = weight / max(ACCELERATION_SD**2, hypot(along, across) / MOST_EVIDENCE)
                 self.likelihood += np.array([gain * along, gain * across, 0.0]) @ _TERMS
         if self._joint.has_axes:
-            self.likelihood += weight * self._axes(attitude, rate)
+            self.likelihood += weight * self._axes(attitude, rate, self._shaking.speed / TIP_M)
 
-    def _axes(self, attitude: Floats, rate: Floats) -> Floats:
-        """Return the evidence (72,) of the axes, made of products of vectors of a with turned ones of b."""
+    def _axes(self, attitude: Floats, rate: Floats, tips: float) -> Floats:
+        """Return the evidence (72,) of the axes, made of products of vectors of a with turned ones of b;
+        `tips` rad/s is how fast sensors tip on their skin."""
         joint = self._joint
         assert joint.axis_a is not None
         assert joint.axis_b is not None
@@ -84,7 +92,9 @@ class HeadingSearch:
             )
             off = along * along / np.maximum(1.0 - dot * dot, 0.09)
             bend = (dot - sin(joint.carrying_rad)) ** 2
-        found: Floats = -0.5 * (off / RATE_SD**2 + bend / ANGLE_SD**2)
+        rate_variance, variance = RATE_SD**2 + tips**2, ANGLE_SD**2 + (tips / SWING_RATE) ** 2
+        again = RATE_SD**2 / rate_variance  # what tips does so with every swing: it says the same again
+        found: Floats = (-0.5 * again) * (off / rate_variance + bend / variance)
         return found
 
     def best(self) -> tuple[float, float]:
@@ -110,11 +120,12 @@ class HeadingSearch:
 
     def state(self) -> dict[str, Any]:
         """Return all that changes, as plain values."""
-        return {"likelihood": self.likelihood.tolist()}
+        return {"likelihood": self.likelihood.tolist(), "shaking": self._shaking.state()}
 
     def restore(self, state: dict[str, Any]) -> None:
         """Go on as the search whose state this is would have."""
         self.likelihood = np.array(state["likelihood"])
+        self._shaking = Shaking.of(state["shaking"]) if "shaking" in state else Shaking()
 
 
 def _turning(u: Floats, v: Floats) -> list[float]:

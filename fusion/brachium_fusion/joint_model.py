@@ -21,6 +21,7 @@ import numpy as np
 
 from brachium_body import rotation
 from brachium_fusion.joint_matrices import Floats, headings, matrix_of, turn_by, vector_of
+from brachium_fusion.joint_shaking import LEAST, Shaking
 
 NODE_S = 0.08
 """Constraints are applied this often: twice as often as the arm's fastest movements need."""
@@ -139,6 +140,8 @@ class JointState:
     """Learnt factors of the variances of noise: of walks and agreement, of axes."""
     still_s: tuple[float, float]
     """For how long each sensor has been at rest."""
+    shaking: Shaking
+    """How far skin lets them swing."""
 
     @property
     def velocity(self) -> Floats:
@@ -162,19 +165,21 @@ class JointState:
 
     def copy(self) -> "JointState":
         """Return another with the same values; arrays are replaced, never written to."""
-        return JointState(self.attitude, self.others, self.covariance, self.noise, self.still_s)
+        return JointState(self.attitude, self.others, self.covariance, self.noise, self.still_s, self.shaking)
 
     def state(self) -> list[Any]:
         """Return all as plain values."""
         arrays = self.attitude, self.others, self.covariance
-        return [*(array.tolist() for array in arrays), list(self.noise), list(self.still_s)]
+        plain = [array.tolist() for array in arrays]
+        return [*plain, list(self.noise), list(self.still_s), self.shaking.state()]
 
     @staticmethod
     def of(state: list[Any]) -> "JointState":
         """Return what has this state."""
         attitude, others, covariance = (np.array(values) for values in state[:3])
-        (walks, axes), (still_a, still_b) = state[3:]
-        return JointState(attitude, others, covariance, (walks, axes), (still_a, still_b))
+        (walks, axes), (still_a, still_b) = state[3:5]
+        shaking = Shaking.of(state[5]) if state[5:] else Shaking(share=LEAST)
+        return JointState(attitude, others, covariance, (walks, axes), (still_a, still_b), shaking)
 
 
 BLOCK = 15
@@ -196,7 +201,7 @@ def begin(joint: Joint, attitude: Floats, gyr: Floats, heading_sd: float) -> Joi
     others[:, 0:3] = _velocity_at_rest(attitude, gyr, lever)
     others[:, 9:12] = lever
     covariance = np.diag(deviation.ravel() ** 2)
-    return JointState(attitude, others, covariance, (1.0, 1.0), (0.0, 0.0))
+    return JointState(attitude, others, covariance, (1.0, 1.0), (0.0, 0.0), Shaking(share=LEAST))
 
 
 def resume(joint: Joint, state: JointState, attitude: Floats, gyr: Floats, heading_sd: float) -> JointState:
@@ -206,7 +211,7 @@ def resume(joint: Joint, state: JointState, attitude: Floats, gyr: Floats, headi
     new.covariance[kept] = state.covariance[kept]
     new.others[:, 3:] = state.others[:, 3:]
     new.others[:, 0:3] = _velocity_at_rest(attitude, gyr - state.gyro_bias, state.lever)
-    new.noise = state.noise
+    new.noise, new.shaking = state.noise, state.shaking.after_gap()
     return new
 
 

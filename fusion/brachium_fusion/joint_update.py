@@ -7,6 +7,7 @@ import numpy as np
 from brachium_body import rotation
 from brachium_fusion.joint_matrices import Floats, orthonormal, turn_by
 from brachium_fusion.joint_model import BLOCK, NODE_S, SPEED_SD, Interval, Joint, JointState, add
+from brachium_fusion.joint_shaking import SWING_RATE, TIP_M
 
 GRAVITY = 9.80665
 
@@ -71,6 +72,7 @@ def advance(state: JointState, interval: Interval) -> Floats:
     state.attitude = orthonormal(state.attitude @ turned)
     state.others = state.others.copy()
     state.others[:, 0:3] += push[:, :, 0]
+    state.shaking = state.shaking.then(push[:, :, 0] / span)
     state.others[:, 2] -= GRAVITY * span
     still_a, still_b = (interval.angle <= STILL_RATE * span).tolist()
     state.still_s = (
@@ -137,7 +139,7 @@ def constrain(state: JointState, joint: Joint, gyr: Floats, shared: float | None
     """Apply in place what holds at a node: gyr (2, 3) there, `shared` the heading of b to a, rad, by
     magnetometers. Return how far the joint centre's two velocities were apart, in standard deviations."""
     told = _Told()
-    _agree(told, state, gyr)
+    unswung = _agree(told, state, gyr)
     if joint.has_axes:
         _hold_axes(told, state, joint, gyr)
     for i in (0, 1):
@@ -148,6 +150,7 @@ def constrain(state: JointState, joint: Joint, gyr: Floats, shared: float | None
         row = told.part(1, -shared, 2.0 * SHARED_HEADING_SD**2 * SHARED_HEADING_TIME_S / NODE_S)
         row[0, 0, 2], row[0, 1, 2] = -1.0, 1.0
     lengths = told.solve(state)
+    state.shaking = state.shaking.learnt(lengths[0], unswung, NODE_S)
     walks, axes = state.noise
     state.noise = _learn(walks, lengths[0]), _learn(axes, lengths[1]) if joint.has_axes else axes
     return lengths[0]
@@ -159,8 +162,9 @@ def _learn(noise: float, length: float) -> float:
     return min(MOST_NOISE, max(LEAST_NOISE, noise * exp(more)))
 
 
-def _agree(told: _Told, state: JointState, gyr: Floats) -> None:
-    """The joint centre is one, and rests over time."""
+def _agree(told: _Told, state: JointState, gyr: Floats) -> float:
+    """The joint centre is one, and rests over time; return the variance of its velocity by two sensors that
+    do not swing, m^2/s^2."""
     rate = gyr - state.gyro_bias
     turning = state.attitude @ rotation.cross_matrix(rate)
     arm = (turning @ state.lever[:, :, None])[:, :, 0]
@@ -172,10 +176,12 @@ def _agree(told: _Told, state: JointState, gyr: Floats) -> None:
     centre = state.velocity + arm
     squared = float(np.einsum("si,si->s", rate, rate).max())
     variance = state.noise[0] * (CENTRE_SD**2 + CENTRE_SD_PER_RATE**2 * squared)
-    rows = told.part(6, np.concatenate([centre[1] - centre[0], -0.5 * (centre[0] + centre[1])]), variance)
+    apart = np.concatenate([centre[1] - centre[0], -0.5 * (centre[0] + centre[1])])
+    rows = told.part(6, apart, variance + state.shaking.speed**2)
     rows[0:3, 0], rows[0:3, 1] = per_sensor[0], -per_sensor[1]
     rows[3:6, 0], rows[3:6, 1] = 0.5 * per_sensor[0], 0.5 * per_sensor[1]
     told.variance[3:6] = SPEED_SD**2 * SPEED_TIME_S / NODE_S
+    return variance
 
 
 def _hold_axes(told: _Told, state: JointState, joint: Joint, gyr: Floats) -> None:
@@ -186,7 +192,8 @@ def _hold_axes(told: _Told, state: JointState, joint: Joint, gyr: Floats) -> Non
     rate_a, rate_b = (state.attitude @ gyr[:, :, None])[:, :, 0]
     bending = rate_b - rate_a
     looks = NODE_S * (sqrt(float(bending @ bending)) / AXIS_TURN + 1.0 / AXIS_TIME_S)
-    variance = state.noise[1] * AXIS_SD**2 / looks
+    tips = state.shaking.speed / (SWING_RATE * TIP_M)
+    variance = (state.noise[1] * AXIS_SD**2 + tips**2) / looks
     if joint.axes == 2:
         row = told.part(1, sin(joint.carrying_rad) - float(a @ b), variance)
         normal = rotation.cross_matrix(a) @ b

@@ -37,6 +37,18 @@ def test_live_follows_the_truth_and_its_figures_are_small():
     assert made.counts.start == 150
 
 
+def test_an_arm_that_trembles_on_skin_keeps_its_angles_though_samples_are_lost():
+    """The sensors tip by 5 deg five times a second, which nothing takes away; headings must not follow."""
+    made = Emulated(
+        Trial(exercise="shoulder-impaired", level="typical", seed=2, seconds=9.0, loss=0.05, routine=GUIDED)
+    )
+    found = made.solved("auto")
+    for angle, most in (("shoulder_flexion", 6.0), ("elbow_flexion", 6.0), ("forearm_pronation", 4.0)):
+        error = angle_deg(angle)(made, found)
+        assert error is not None
+        assert error < most, angle
+
+
 def test_what_is_assumed_for_a_missing_segment_does_not_count():
     made = Emulated(replace(SHRUG, loss=0.1, burst=10))
     found = made.solved("auto")
