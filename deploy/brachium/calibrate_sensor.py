@@ -96,6 +96,8 @@ class _Screen:
         if not self._terminal:
             if (progress.step, progress.attempt) != self._at:
                 self._at, self._covered = (progress.step, progress.attempt), 0.0
+                if progress.step in progress.refused:
+                    print(f"{progress.step} refused: {progress.refused[progress.step]}", flush=True)
             # What is covered is guessed anew with every reading, and falls at times: no news for a line.
             self._covered = max(self._covered, progress.coverage)
             words = sensor_picture.line(msgspec.structs.replace(progress, coverage=self._covered))

@@ -45,9 +45,8 @@ def bar(share: float) -> str:
 
 def line(progress: SensorProgress) -> str:
     """Return what has come so far in one line that changes only with what is worth a new one."""
-    words = f"{progress.step}: {progress.reason}"
-    if progress.step in progress.refused:
-        words = f"{progress.step} refused: {progress.refused[progress.step]}; attempt {progress.attempt}"
+    again = f", attempt {progress.attempt}" if progress.attempt > 1 else ""
+    words = f"{progress.step}{again}: {progress.reason}"
     if progress.step == "turn":
         words += f" ({10 * int(10.0 * progress.coverage)} % of all directions)"
     return words

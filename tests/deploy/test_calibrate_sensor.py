@@ -114,7 +114,7 @@ def test_a_sensor_that_is_not_there_is_named(network: str, capsys: pytest.Captur
     ("more", "said"),
     [
         (("--sensor", "knee"), "--sensor takes one of"),
-        (("--steps", "rest"), "--sensor takes one of"),
+        (("--steps", "rest"), "--steps belongs to --sensor"),
         (("--sensor", SEGMENT, "--steps", "dance"), "some of rest,faces,turn"),
         (("--sensor", SEGMENT, "--zero"), "no --zero"),
     ],
@@ -151,7 +151,25 @@ def test_the_picture_ticks_faces_and_fills_the_sphere() -> None:
         "refused: it was moved",
         "leave it",
     ]
-    assert sensor_picture.line(rest) == "rest refused: it was moved; attempt 2"
+    assert sensor_picture.line(rest) == "rest, attempt 2: leave it"
+
+
+def test_why_a_step_was_refused_is_said_once_and_then_what_to_do(capsys: pytest.CaptureFixture[str]) -> None:
+    screen = calibrate_sensor._Screen(quiet=False)
+    refused = {"refused": {"turn": "it was too slow"}, "attempt": 2}
+    screen.show(progress(step="turn", reason="turn it about"))
+    for share in (0.0, 0.2, 0.5):
+        screen.show(progress(step="turn", reason="turn it about, faster", coverage=share, **refused))
+    screen.show(progress(step="turn", reason="turn it", refused={"turn": "it was too slow"}, attempt=3))
+    assert capsys.readouterr().out.splitlines() == [
+        "turn: turn it about (0 % of all directions)",
+        "turn refused: it was too slow",
+        "turn, attempt 2: turn it about, faster (0 % of all directions)",
+        "turn, attempt 2: turn it about, faster (20 % of all directions)",
+        "turn, attempt 2: turn it about, faster (50 % of all directions)",
+        "turn refused: it was too slow",
+        "turn, attempt 3: turn it (0 % of all directions)",
+    ]
 
 
 def test_the_papers_way_leaves_soft_iron() -> None:

@@ -92,6 +92,8 @@ def _sensor(args: argparse.Namespace) -> int:
     from brachium_body.segments import SEGMENTS
     from brachium_wire.bus import Bus
 
+    if args.sensor is None:
+        raise Usage("--steps belongs to --sensor: say whose, as in --sensor forearm_r")
     if args.sensor not in SEGMENTS:
         raise Usage(f"--sensor takes one of {', '.join(SEGMENTS)}; came {args.sensor!r}")
     if args.zero or args.angle:

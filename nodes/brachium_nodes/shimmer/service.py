@@ -100,7 +100,7 @@ class ShimmerService:
             except (PortGone, ShimmerError) as error:
                 reason = str(error)
                 if reason != said:
-                    log.warning("%s", reason)
+                    log.warning("%s; it is tried again until it is there", reason)
                 said = self._heart.text = reason
             self._pause(pause_s, stop)
             pause_s = min(2.0 * pause_s, LONGEST_PAUSE_S)
