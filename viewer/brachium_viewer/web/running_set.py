@@ -46,6 +46,7 @@ class RunningSet:
         self._values: list[float] = []
         self._counted_s = -EVERY_S
         self._found = MovementSet(repetitions=(), tries=())
+        self._tops: list[float] = []
         self._over_since: float | None = None
 
     def feed(self, skeleton: Skeleton) -> None:
@@ -61,13 +62,15 @@ class RunningSet:
         self._watch_limit(now, value)
         if now - self._counted_s >= EVERY_S:
             self._counted_s = now
-            self._found = movement_set(np.array(self._times), np.array(self._values), FLOOR_DEG)
+            times, values = np.array(self._times), np.array(self._values)
+            self._found = movement_set(times, values, FLOOR_DEG)
+            peaks = [r.peak_s for r in self._found.repetitions]
+            self._tops = [float(top) for top in np.interp(peaks, times, values)] if peaks else []
 
     def progress(self) -> Progress:
         """Return where the set stands."""
         now = self._values[-1] if self._values else np.nan
-        tops = [float(np.interp(r.peak_s, self._times, self._values)) for r in self._found.repetitions]
-        known = [self._sign * top for top in tops if np.isfinite(top)]
+        known = [self._sign * top for top in self._tops if np.isfinite(top)]
         wanted = self.begins.repetitions
         over = self._over_since is not None and self._times[-1] - self._over_since >= LIMIT_HELD_S
         return Progress(
