@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from brachium.export_readers import readers
 from brachium.export_readers.found import Found
-from brachium.export_readers.readers import READERS
 from brachium.version import version
 from brachium_fusion import solve
 from brachium_fusion.solve_table import tabled
@@ -86,7 +86,7 @@ def differences(source: Table, to: str, folder: Path) -> dict[str, Any]:
     """Export to one format, read it, and return the largest differences and the gaps that are none."""
     out = folder / ("study" if to == "motion-bids" else f"arm.{to}")
     files = formats.export(source, out, formats.Wish(to=to), version())
-    found = READERS[to](out)
+    found = readers.READERS[to](out)
     held, told = _held(found, len(source)), _angles(source)
     angles = [compared(source.columns[n], v, 360.0) for n, v in found.angles_deg.items() if n in told]
     places = [compared(_place_mm(source, n), v, None, held.get(n)) for n, v in found.places_mm.items()]
