@@ -34,8 +34,14 @@ READY_S = 60.0
 SETTLE_S = 4.0
 """A page's first second compiles what draws it."""
 CHROMIUM = ("chromium", "chromium-browser", "google-chrome")
-SOFTWARE = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-quic"]
-"""No graphics card: what every machine can do."""
+SOFTWARE = [
+    "--no-sandbox",
+    "--disable-gpu",
+    "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader",
+    "--disable-quic",
+]
+"""No graphics card: the page is put together by the processor, and so is what WebGL draws."""
 
 # Notes how long ago a frame was published when its picture was done. Every picture begins with clear.
 LISTENER = """

@@ -94,4 +94,24 @@ def _page() -> Proof:
     )
 
 
-PAGE_PROOFS: tuple[Proof, ...] = (_page(), _exports(), _recorder())
+def _broken(figures: dict[str, Any]) -> float:
+    return float(len(figures["broken"]))
+
+
+def _report() -> Proof:
+    """The report of a 20-minute session of both arms, printed."""
+    return Proof(
+        name="report",
+        commands=(("bench", "--report", "--json"),),
+        promises=(
+            figure("report of 20 minutes", "s", "report_s", at_most=3.0),
+            figure("report of 20 minutes, processor", "s", "report_cpu_s"),
+            figure("reading the recording without a look into it", "s", "read_s"),
+            figure("page", "MB", "page_mb", at_most=1.0),
+            figure("A4 pages", "1", "pages", at_most=3),
+            Promise(name="figures or cells that are cut or empty", unit="1", take=_broken, at_most=0),
+        ),
+    )
+
+
+PAGE_PROOFS: tuple[Proof, ...] = (_page(), _exports(), _recorder(), _report())

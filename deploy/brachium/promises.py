@@ -110,6 +110,7 @@ ACCURACY: dict[str, tuple[str, ...]] = {
     "calibration": ("alignment", "contracture", "refusals", "wear-check", "slip", "sensor-sets"),
     "tsilomitrou": ("tsilomitrou", "tsilomitrou-angles", "packet-loss", "calibration-left-out"),
     "zhou": ("zhou", "zhou-errata", "zhou-lambda", "zhou-places", "detection"),
+    "sessions": ("repetitions", "donnings"),
 }
 """Tables of `evaluate`, by the proof that makes them; docs/accuracy.md shows them."""
 AT_LEVEL = {"patient": "patient"}

@@ -43,8 +43,7 @@ class PersonSettings:
     seed: int = 0
     height_m: float = 1.80
     carrying_deg: float = 0.0
-    """Valgus of the elbow, varus negative. 0 as in the arm model of Tsilomitrou 2021; people have about 8
-    (women more)."""
+    """Valgus of the elbow, varus negative. 0 as in Tsilomitrou 2021; people have about 8 (women more)."""
     contracture_deg: float = 0.0
     """Elbow flexion at which the elbows stop when straightened; 0: they straighten."""
     routine: str = ""
@@ -52,8 +51,7 @@ class PersonSettings:
     extent: float = 1.0
     """How far the exercise goes from neutral: 1 as it is described, 0 stands still."""
     movement_seed: int | None = None
-    """Of the exercise's movement, so that persons of other seeds, who differ in all else, make the very same
-    one; None: of `seed`."""
+    """Of the exercise's movement alone, so that who differs in all else makes the same; None: `seed`."""
     sway_deg: float = 0.0
     """Standard deviation of each of the trunk's three rotations while exercising; 0 is a back held still."""
 
@@ -130,10 +128,9 @@ class Person:
     def posture(self, t: Array, side: Side) -> Posture:
         """Return joint angles and shoulder translation at times (n,)."""
         s, build = self.settings, self.build(side)
-        motion = EXERCISES[s.exercise].motion
-        exercising = eased(t - self.begins_s - TRANSITION_S, rise_s=1.0)
         own = s.seed if s.movement_seed is None else s.movement_seed
-        moving = motion(exercising, Variation(own, side), build)
+        exercising = eased(t - self.begins_s - TRANSITION_S, rise_s=1.0)
+        moving = EXERCISES[s.exercise].motion(exercising, Variation(own, side), build)
         active = s.arms in (side, "both")
         share = self._begun(t) if active else np.zeros(len(t))
         made, before = moving.scaled(s.extent * share), share < 1.0

@@ -45,6 +45,9 @@ def configure(parser: argparse.ArgumentParser) -> None:
         help="instead: what CAN sensors cost; whether their samples mix; what a machine hears of a fault",
     )
     other.add_argument("--page", action="store_true", help="instead: how late the page draws; what it costs")
+    other.add_argument(
+        "--report", action="store_true", help="instead: what a 20-minute session's report costs"
+    )
     other.add_argument("--recorder", action="store_true", help="instead: what a kill or a full disk costs")
     parser.add_argument("--kills", type=whole(1, 1000), default=20, help="of --recorder")
     parser.add_argument("--nodes", type=whole(1, 500), default=256, help="of --gateway")
@@ -56,7 +59,7 @@ def run(args: argparse.Namespace) -> int:
     """Measure, one network after the other."""
     if args.exports:
         return _exports(args)
-    parts = (args.gateway, args.clock, args.sensors, args.can, args.recorder, args.page)
+    parts = (args.gateway, args.clock, args.sensors, args.can, args.recorder, args.page, args.report)
     if any(parts) or args.hostile is not None:
         return _other(args)
     figures = measure(QUICK_WINDOW_S if args.quick else WINDOW_S, args.arms)
@@ -89,6 +92,10 @@ def _other(args: argparse.Namespace) -> int:
         from brachium import bench_page
 
         found = bench_page.measure(QUICK_WINDOW_S if args.quick else 2.0 * WINDOW_S)
+    elif args.report:
+        from brachium import bench_report
+
+        found = bench_report.measure(*((8.0, 1) if args.quick else ()))
     elif args.clock:
         from brachium import bench_clock
 
