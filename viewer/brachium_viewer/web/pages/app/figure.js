@@ -28,10 +28,10 @@ const LEGS = [
 ];
 
 const UP = new THREE.Vector3(0, 1, 0);
-const BALL = new THREE.SphereGeometry(1, 28, 20);
+const BALL = new THREE.SphereGeometry(1, 18, 12);
 
 function material(colour) {
-  return new THREE.MeshStandardMaterial({ color: colour, roughness: 0.62, metalness: 0 });
+  return new THREE.MeshLambertMaterial({ color: colour }); // cheap where there is no graphics card
 }
 
 /** A limb between two points: a tapered tube with a ball at each end, so that limbs that meet are one piece. */
@@ -39,7 +39,7 @@ class Limb {
   constructor(parent, near, far, surface) {
     this.near = near;
     this.far = far;
-    this.tube = new THREE.Mesh(new THREE.CylinderGeometry(far, near, 1, 28, 1, true), surface);
+    this.tube = new THREE.Mesh(new THREE.CylinderGeometry(far, near, 1, 18, 1, true), surface);
     this.first = new THREE.Mesh(BALL, surface);
     this.last = new THREE.Mesh(BALL, surface);
     this.first.scale.setScalar(near);
@@ -113,8 +113,8 @@ export class Figure {
 
   torso() {
     const outline = OUTLINE.map(([half, height]) => new THREE.Vector2(half, height));
-    const curve = new THREE.SplineCurve(outline).getPoints(60);
-    const torso = new THREE.Mesh(new THREE.LatheGeometry(curve, 48), this.body);
+    const curve = new THREE.SplineCurve(outline).getPoints(30);
+    const torso = new THREE.Mesh(new THREE.LatheGeometry(curve, 32), this.body);
     torso.rotation.x = Math.PI / 2;
     torso.scale.set(1, 1, DEPTH);
     torso.position.y = -0.03;

@@ -2,7 +2,7 @@
 
 import { Chart } from "./chart.js";
 import { Gauge } from "./gauge.js";
-import { $, make, renew } from "./page.js";
+import { $, make, put, renew } from "./page.js";
 import { MEASURED } from "./quality.js";
 import { counted, warn } from "./tone.js";
 import { number, say } from "./words.js";
@@ -38,10 +38,10 @@ export class Numbers {
     const arm = frame.arms[this.side];
     const [value, quality] = arm?.angles[this.angle] ?? [null, "missing"];
     const measured = MEASURED.has(quality) && value != null;
-    $("angle-value").textContent = degrees(value);
+    put($("angle-value"), degrees(value));
     $("angle-value").parentElement.classList.toggle("doubtful", !measured);
     $("angle-quality").hidden = measured;
-    if (!measured) $("angle-quality").textContent = say(`quality.${value == null ? "missing" : quality}`);
+    if (!measured) put($("angle-quality"), say(`quality.${value == null ? "missing" : quality}`));
     this.gauge.show(value, quality);
     if (arm && !arm.stale) this.chart.add(arm.t, value, quality);
     this.others(frame.arms);
@@ -63,12 +63,12 @@ export class Numbers {
 
   progress(set) {
     const shown = set ?? this.ended;
-    $("count-value").textContent = shown ? number(shown.count) : "–";
+    put($("count-value"), shown ? number(shown.count) : "–");
     $("count-value").parentElement.classList.toggle("done", Boolean(shown?.done));
     $("count-value").parentElement.classList.toggle("empty", !shown);
-    $("count-last").textContent = degrees(shown?.last);
-    $("count-best").textContent = degrees(shown?.best);
-    $("count-tries").textContent = shown ? number(shown.tries) : "–";
+    put($("count-last"), degrees(shown?.last));
+    put($("count-best"), degrees(shown?.best));
+    put($("count-tries"), shown ? number(shown.tries) : "–");
     if (set && this.count !== null && set.count > this.count) {
       counted();
       $("count-said").textContent = say("counted", { count: set.count });
@@ -81,7 +81,7 @@ export class Numbers {
     $("stage").classList.toggle("beyond", over);
     if ($("over").hidden === over) $("over").hidden = !over;
     if (!over) return;
-    $("over-words").textContent = say("over", { limit: number(this.limit ?? 0) });
+    put($("over-words"), say("over", { limit: number(this.limit ?? 0) }));
     if (performance.now() - this.warned > WARN_MS) {
       this.warned = performance.now();
       warn();

@@ -12,6 +12,11 @@ export function make(name, words = {}, ...inside) {
   return one;
 }
 
+/** Put a text into an element, when it is another one: what does not change is not painted again. */
+export function put(element, text) {
+  if (element.textContent !== text) element.textContent = text;
+}
+
 /** Put children into an element only when they say something new: what has the focus keeps it. */
 export function renew(element, key, children) {
   if (element.dataset.key === key) return;
