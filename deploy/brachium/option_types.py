@@ -4,6 +4,7 @@ import re
 from argparse import ArgumentTypeError
 from collections.abc import Callable
 from math import inf
+from pathlib import Path
 
 LONGEST_S = 1e7
 """Four months: more than any run, and less than what a wait of the operating system takes."""
@@ -66,3 +67,12 @@ probability = real(0.0, 1.0)
 port = whole(1, 65535)
 port_or_any = whole(0, 65535)
 seed = whole(0, 2**32 - 1)
+
+
+def folder(text: str) -> Path:
+    """Return a folder's path, there or not yet; a file in its place or on its way is refused."""
+    path = Path(text)
+    for place in (path, *path.parents):
+        if place.exists() and not place.is_dir():
+            raise ArgumentTypeError(f"{text!r} cannot be used: {place} is a file, and a folder goes there")
+    return path

@@ -4,6 +4,7 @@ import json
 import os
 import select
 import time
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -51,13 +52,18 @@ def tell(line: int, configuration: dict[str, Any], timeout_s: float = TIMEOUT_S)
 
 
 def read_configuration(path: Path) -> dict[str, Any]:
-    """Return a `brachium.json`. Raises NotTold; what its fields may hold the node itself says."""
+    """Return a `brachium.json`, checked by the node's own rules. Raises NotTold."""
     try:
         said = json.loads(path.read_text("utf-8"))
     except (OSError, ValueError) as error:
         raise NotTold(f"{path} cannot be read as JSON: {error}") from None
     if not isinstance(said, dict):
         raise NotTold(f"{path} must hold one JSON object")
+    rules = import_module("brachium_nodes.firmware.configuration")  # MicroPython: it has no types
+    try:
+        rules.checked(said)
+    except (ValueError, TypeError) as error:
+        raise NotTold(f"the node would refuse {path}: {error}") from None
     return said
 
 

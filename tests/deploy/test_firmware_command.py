@@ -69,7 +69,7 @@ def test_a_node_is_told_line_by_line(answer: str, code: int, tmp_path: Path, cap
     heard: list[str] = []
     node = threading.Thread(target=_node, args=(here, answer, heard))
     node.start()
-    about = {"id": "n1", "token": "ä"}
+    about = {"id": "n1", "token": "t", "wifi": {"name": "päss", "password": ""}}
     (tmp_path / "brachium.json").write_text(json.dumps(about))
     try:
         words = ["--configure", str(tmp_path / "brachium.json"), "--serial", os.ttyname(there)]
@@ -81,7 +81,28 @@ def test_a_node_is_told_line_by_line(answer: str, code: int, tmp_path: Path, cap
     assert heard[0] == "setup"
     assert json.loads(heard[1]) == about
     assert heard[1].isascii()
-    assert ("'id' is missing" in capsys.readouterr().err) == bool(code)
+    said = capsys.readouterr().err
+    assert f"waiting up to 40 s for the node at {words[-1]}" in said
+    assert ("'id' is missing" in said) == bool(code)
+
+
+@pytest.mark.parametrize(
+    ("about", "said"),
+    [
+        ({"token": "t"}, "'id' is missing"),
+        ({"id": "n1", "token": "t", "rate": 50}, "'rate' is not known"),
+        ({"id": "n1", "token": "t", "rate_hz": None}, "would refuse"),
+    ],
+)
+def test_fields_are_looked_at_before_the_port(
+    about: dict[str, object], said: str, tmp_path: Path, capsys
+) -> None:
+    file = tmp_path / "brachium.json"
+    file.write_text(json.dumps(about))
+    assert main(["firmware", "--configure", str(file), "--serial", str(tmp_path / "no-port")]) == 2
+    told = capsys.readouterr().err
+    assert said in told
+    assert "no-port" not in told
 
 
 def _node(line: int, answer: str, heard: list[str]) -> None:

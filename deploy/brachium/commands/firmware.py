@@ -12,14 +12,14 @@ from pathlib import Path
 from statistics import median
 from tempfile import TemporaryDirectory
 
-from brachium.option_types import duration_s
+from brachium.option_types import duration_s, folder
 from brachium.shell import Failed, Usage, add_json, print_json, stop_on_signals
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
     """Add the options."""
     what = parser.add_mutually_exclusive_group(required=True)
-    what.add_argument("--out", type=Path, metavar="DIR", help="write the files for the chip here")
+    what.add_argument("--out", type=folder, metavar="DIR", help="write the files for the chip here")
     what.add_argument(
         "--run", choices=["quiet", "faults"], help="run it on this host, and count every sample"
     )
@@ -33,7 +33,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--serial", metavar="PORT", help="where that node is, as in /dev/ttyUSB0")
     parser.add_argument("--rate", type=int, choices=[50, 100], default=50, help="samples a second of --run")
     parser.add_argument("--seconds", type=duration_s, default=60.0, help="how long to run")
-    parser.add_argument("--folder", type=Path, metavar="DIR", help="keep the run's logs here")
+    parser.add_argument("--folder", type=folder, metavar="DIR", help="keep the run's logs here")
     add_json(parser)
 
 
@@ -60,7 +60,7 @@ def _measure(args: argparse.Namespace, folder: Path) -> int:
 
 
 def _configure_node(args: argparse.Namespace) -> int:
-    from brachium_nodes.serial_setup import NotTold, open_serial, read_configuration, tell
+    from brachium_nodes.serial_setup import TIMEOUT_S, NotTold, open_serial, read_configuration, tell
 
     if args.serial is None:
         raise Usage("--configure needs --serial PORT, as in /dev/ttyUSB0")
@@ -69,7 +69,9 @@ def _configure_node(args: argparse.Namespace) -> int:
     except NotTold as error:
         raise Usage(str(error)) from None
     try:
-        tell(open_serial(args.serial), configuration)
+        line = open_serial(args.serial)
+        print(f"waiting up to {TIMEOUT_S:.0f} s for the node at {args.serial}", file=sys.stderr, flush=True)
+        tell(line, configuration)
     except NotTold as error:
         raise Failed(str(error)) from None
     print(f"the node at {args.serial} starts anew with {args.configure}")
