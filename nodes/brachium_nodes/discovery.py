@@ -72,7 +72,14 @@ async def answer_seekers(
     try:
         transport = await _listen(address, port, lambda: _Answering(url, token_sha256_of))
     except OSError as error:
-        log.warning("nodes that seek a gateway by UDP port %d are not heard: %s", port, error)
+        log.warning(
+            "nodes that seek a gateway by UDP port %d are not heard (%s): give this gateway another "
+            "--discovery-port and its nodes the same (discovery.port in their brachium.json), or write "
+            '"gateway": "%s" there',
+            port,
+            error.strerror or error,
+            url,
+        )
     try:
         yield
     finally:

@@ -7,14 +7,18 @@ class CannotListen(RuntimeError):
     """The address or port cannot be had; the text says which and what to do."""
 
 
+class BadAddress(ValueError):
+    """What was given as an address is none that may be listened at; the text says what to give."""
+
+
 def listening_address(bind: str) -> str:
-    """Return the address of one interface, or raise CannotListen."""
+    """Return the address of one interface, or raise BadAddress."""
     try:
         address = ipaddress.ip_address(bind)
     except ValueError:
-        raise CannotListen(f"--bind {bind!r} is no address; write one, as 127.0.0.1") from None
+        raise BadAddress(f"--bind {bind!r} is no address; write one, as 127.0.0.1") from None
     if address.is_unspecified:
-        raise CannotListen(f"--bind {bind} would listen everywhere; give the address of one interface")
+        raise BadAddress(f"--bind {bind} would listen everywhere; give the address of one interface")
     return str(address)
 
 

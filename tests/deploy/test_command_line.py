@@ -6,6 +6,7 @@ import subprocess
 import sys
 from dataclasses import fields
 from importlib import import_module
+from pathlib import Path
 
 import pytest
 
@@ -120,6 +121,7 @@ def test_the_version_is_the_distributions(brachium):
 
 BAD_INPUT = {
     "all interfaces": (["router", "--bind", "0.0.0.0"], "every interface"),
+    "no such interface": (["slimevr", "--bind", "nohost"], "'nohost' is no address"),
     "port outside": (["router", "--port", "99999"], "65535"),
     "no such input": (["solve", "nothing.mcap"], "nothing.mcap"),
     "foreign file": (["solve", __file__], "not a recording"),
@@ -184,6 +186,27 @@ def test_a_number_out_of_range_is_usage(
     said = capsys.readouterr().err
     assert "cannot be used" in said
     assert repr(value) in said
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["record", "--out"],
+        ["demo", "--out"],
+        ["firmware", "--out"],
+        ["sensor", "x", "--out"],
+        ["prove", "--out"],
+    ],
+    ids=lambda words: words[0],
+)
+@pytest.mark.parametrize("inside", ["", "inside"])
+def test_a_file_where_a_folder_goes_is_named(
+    words: list[str], inside: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+):
+    (tmp_path / "afile").touch()
+    with pytest.raises(SystemExit, match="2"):
+        main([*words, str(tmp_path / "afile" / inside)])
+    assert f"{tmp_path / 'afile'} is a file, and a folder goes there" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("case", BAD_INPUT)

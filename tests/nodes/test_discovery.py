@@ -67,3 +67,14 @@ def test_a_gateway_hears_broadcasts_on_its_interface(gateway, free_port):
         asking.sendto(question(), ("127.255.255.255", free_port))
         said = json.loads(asking.recv(1024))
     assert said["url"] == running.url
+
+
+@pytest.mark.network
+def test_a_port_that_another_gateway_has_is_told_with_what_to_do(gateway, free_port, caplog):
+    node = NodeEntry(id="n1", token_sha256=token_sha256("secret"))
+    gateway(node, discovery_port=free_port)
+    second = gateway(node, id="second", discovery_port=free_port)
+    (said,) = [record.getMessage() for record in caplog.records if record.name.endswith("discovery")]
+    assert f"UDP port {free_port} are not heard (Address already in use)" in said
+    assert "another --discovery-port" in said
+    assert f'"gateway": "{second.url}"' in said

@@ -11,7 +11,8 @@ from websockets.asyncio.client import connect
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
 from brachium_nodes import node_frames as f
-from brachium_nodes.gateway import CannotListen, GatewaySettings, run, token_sha256
+from brachium_nodes.gateway import GatewaySettings, run, token_sha256
+from brachium_nodes.listening import BadAddress, CannotListen
 from brachium_nodes.node_client import NodeClient, NotWelcome
 from brachium_nodes.roster import NodeEntry
 from brachium_wire import keys
@@ -452,7 +453,7 @@ def test_a_port_in_use_is_named_with_what_to_do(gateway, endpoint) -> None:
     ("bind", "said"), [("0.0.0.0", "everywhere"), ("::", "everywhere"), ("lan", "no address")]
 )
 def test_an_address_that_is_no_one_interface_is_refused(endpoint, bind, said) -> None:
-    with pytest.raises(CannotListen, match=said):
+    with pytest.raises(BadAddress, match=said):
         run(GatewaySettings(endpoint=endpoint, room=ROOM, bind=bind), threading.Event())
 
 

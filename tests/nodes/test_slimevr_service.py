@@ -7,7 +7,7 @@ import threading
 import pytest
 
 from brachium_nodes.host_claim import HostClaims
-from brachium_nodes.listening import CannotListen
+from brachium_nodes.listening import BadAddress, CannotListen
 from brachium_nodes.slimevr.allowed import from_text
 from brachium_nodes.slimevr.service import SlimeVRSettings, run
 from brachium_wire import keys
@@ -25,7 +25,7 @@ SENSOR = struct.pack(">IQBBBHBBB", 15, 1, 0, 1, 10, 0, 0, 0, 0)
     ("bind", "says"), [("0.0.0.0", "one interface"), ("::1", "IPv4"), ("lan", "is no address")]
 )
 def test_it_listens_on_one_ipv4_address(bind, says):
-    with pytest.raises(CannotListen, match=says):
+    with pytest.raises(BadAddress, match=says):
         run(SlimeVRSettings(bind=bind), threading.Event())
 
 

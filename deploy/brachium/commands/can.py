@@ -8,7 +8,7 @@ brachium can --channel can0 --in sensors.toml
 import argparse
 from pathlib import Path
 
-from brachium.option_types import port, whole
+from brachium.option_types import folder, port, whole
 from brachium.shell import Usage, add_network, serve
 
 
@@ -46,7 +46,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--dbc", type=Path, help="of the sensors, in place of the one that their map names")
     parser.add_argument("--batch", type=whole(1, 64), default=5, help="samples in a packet on the network")
     parser.add_argument(
-        "--calibrations", type=Path, metavar="DIR", help="sensor calibrations, as for the gateway"
+        "--calibrations", type=folder, metavar="DIR", help="sensor calibrations, as for the gateway"
     )
 
 

@@ -13,7 +13,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from brachium.option_types import duration_s, probability, seed
+from brachium.option_types import duration_s, folder, probability, seed
 from brachium.shell import Failed, Usage, add_json, as_json, print_json, stop_on_signals
 from brachium.way_in import TOKEN_VARIABLE
 
@@ -52,7 +52,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
         "--loss", type=probability, help="probability that a packet is lost (default: by level)"
     )
     parser.add_argument("--headless", action="store_true", help="without the live view")
-    parser.add_argument("--out", type=Path, metavar="DIR", help="default: brachium-demo/<date and time>")
+    parser.add_argument("--out", type=folder, metavar="DIR", help="default: brachium-demo/<date and time>")
     add_json(parser)
 
 

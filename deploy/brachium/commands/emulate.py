@@ -10,7 +10,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from brachium.option_types import probability, real, seed, whole
+from brachium.option_types import folder, probability, real, seed, whole
 from brachium.shell import Usage, add_json, add_network, print_json, stop_on_signals
 from brachium.way_in import GATEWAY, add_way_in, node_table, read_token
 
@@ -46,7 +46,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
         "--shimmer-delay", type=real(0.0, 1.0), default=0.02, metavar="S", help="from a sample to the port"
     )
     parser.add_argument(
-        "--flash", type=Path, metavar="DIR", help="where the nodes keep their sensors' calibration"
+        "--flash", type=folder, metavar="DIR", help="where the nodes keep their sensors' calibration"
     )
     add_wearer(parser)
     add_faults(parser)

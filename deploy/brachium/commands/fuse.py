@@ -4,9 +4,8 @@ brachium fuse --filter vqf --rate 50
 """
 
 import argparse
-from pathlib import Path
 
-from brachium.option_types import real
+from brachium.option_types import folder, real
 from brachium.shell import add_network, serve
 
 FILTERS = ("auto", "vqf", "complementary", "complementary-printed")
@@ -24,7 +23,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--no-auto-pose", action="store_true", help="calibrate only when asked to")
     parser.add_argument(
-        "--keep", type=Path, metavar="DIR", help="where calibrations are kept (default: the user's state)"
+        "--keep", type=folder, metavar="DIR", help="where calibrations are kept (default: the user's state)"
     )
     parser.add_argument("--no-keep", action="store_true", help="keep no calibration")
     parser.add_argument("--no-joints", action="store_true", help="leave aside what joints tell: less work")

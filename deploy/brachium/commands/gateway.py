@@ -8,7 +8,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from brachium.option_types import port_or_any, sha256
+from brachium.option_types import folder, port_or_any, sha256
 from brachium.shell import Failed, Usage, add_network, serve
 
 if TYPE_CHECKING:
@@ -36,7 +36,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--calibrations",
-        type=Path,
+        type=folder,
         metavar="DIR",
         help="sensor calibrations that brachium sensor kept, for nodes that bring none",
     )

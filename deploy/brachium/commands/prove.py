@@ -16,6 +16,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
+from brachium.option_types import folder
 from brachium.shell import Failed, Usage, as_json
 
 if TYPE_CHECKING:
@@ -37,7 +38,7 @@ class Figure:
 
 def configure(parser: argparse.ArgumentParser) -> None:
     """Add the options."""
-    parser.add_argument("--out", type=Path, default=Path("docs/figures"), metavar="DIR", help="where they go")
+    parser.add_argument("--out", type=folder, default=Path("docs/figures"), metavar="DIR", help="for them")
     parser.add_argument("--only", default="*", metavar="PATTERN", help="only these proofs, as in demo-*")
     parser.add_argument("--data", type=Path, metavar="DIR", help="the real recordings (or $BRACHIUM_DATA)")
     parser.add_argument("--list", action="store_true", help="list what is promised, and end")

@@ -6,7 +6,7 @@ brachium record --out recordings --seconds 60
 import argparse
 from pathlib import Path
 
-from brachium.option_types import duration_s
+from brachium.option_types import duration_s, folder
 from brachium.shell import Failed, add_json, add_network, print_json, stop_on_signals
 
 
@@ -16,7 +16,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
     add_json(parser)
     parser.add_argument("--subject", help="only this subject and the services (default: everybody)")
     parser.add_argument(
-        "--out", type=Path, default=Path("recordings"), metavar="DIR", help="where the file goes"
+        "--out", type=folder, default=Path("recordings"), metavar="DIR", help="where the file goes"
     )
     parser.add_argument("--seconds", type=duration_s, help="how long (default: until Ctrl-C)")
     parser.add_argument("--id", default="main", help="this recorder's name")

@@ -13,6 +13,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from brachium.option_types import folder
 from brachium.shell import Usage, add_json, print_json
 
 if TYPE_CHECKING:
@@ -35,7 +36,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
         help="accel-faces: exactly six faces; mag-min-max: offset only; all: gyro, accel, mag",
     )
     parser.add_argument(
-        "--out", type=Path, metavar="DIR", help="folder for one file a node, as brachium gateway takes it"
+        "--out", type=folder, metavar="DIR", help="folder for one file a node, as brachium gateway takes it"
     )
     add_json(parser)
 

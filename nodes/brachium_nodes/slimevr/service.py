@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from brachium_nodes.assign_command import serve_assign
 from brachium_nodes.discovery import broadcast_address
 from brachium_nodes.host_claim import HostClaims, checked_host
-from brachium_nodes.listening import CannotListen, listening_address, why_not
+from brachium_nodes.listening import BadAddress, CannotListen, listening_address, why_not
 from brachium_nodes.roster import SLIMEVR, Roster
 from brachium_nodes.slimevr.actions import Action, Joined, Left, Publish, Send, Told
 from brachium_nodes.slimevr.allowed import Allowed, AllowList, from_node
@@ -48,9 +48,7 @@ def run(settings: SlimeVRSettings, stop: threading.Event) -> None:
     """Serve trackers until `stop` is set. Raises CannotListen, ValueError or NoRouter, each one line."""
     address = listening_address(settings.bind)
     if ":" in address:
-        raise CannotListen(
-            f"--bind {address}: trackers speak IPv4 only; give the IPv4 address of an interface"
-        )
+        raise BadAddress(f"--bind {address}: trackers speak IPv4 only; give the IPv4 address of an interface")
     checked_host(settings.id)
     allowed = AllowList(settings.trackers)
     with Bus.open(settings.endpoint, stop=stop) as bus:
