@@ -14,6 +14,7 @@ import sys
 from dataclasses import asdict
 from typing import Any
 
+from brachium import figure_text
 from brachium.option_types import whole
 from brachium.shell import add_json, print_json
 
@@ -119,12 +120,7 @@ def _other(args: argparse.Namespace) -> int:
     if args.json:
         print_json(found)
         return 0
-    for name, value in asdict(found).items():
-        print(
-            f"{name.replace('_', ' '):<32}{value:.4g}"
-            if isinstance(value, float)
-            else f"{name.replace('_', ' '):<32}{value}"
-        )
+    print("\n".join(figure_text.lines(found)))
     return 0
 
 
