@@ -128,14 +128,16 @@ export class Chart {
     if (band) {
       ctx.fillStyle = colour("--band");
       ctx.fillRect(bbox.left, at(band[1]), bbox.width, at(band[0]) - at(band[1]));
-      this.word(ctx, say("reference"), bbox.left + 6 * ratio, at(band[1]) + 14 * ratio, "--good", "left");
     }
     if (limit != null) {
-      ctx.fillStyle = colour("--bad-soft");
+      ctx.fillStyle = colour("--bad");
+      ctx.globalAlpha = 0.14; // the reference is still seen behind it
       const edge = at(limit);
       if (rises) ctx.fillRect(bbox.left, bbox.top, bbox.width, edge - bbox.top);
       else ctx.fillRect(bbox.left, edge, bbox.width, bbox.top + bbox.height - edge);
+      ctx.globalAlpha = 1;
     }
+    if (band) this.word(ctx, say("reference"), bbox.left + 6 * ratio, at(band[1]) + 14 * ratio, "--good", "left");
     const right = bbox.left + bbox.width - 6 * ratio;
     this.line(ctx, bbox, need, at, "--ink", [2, 4], say("need"), bbox.left + 0.45 * bbox.width, -5);
     this.line(ctx, bbox, goal, at, "--goal", [8, 5], say("goal"), right, -5);
