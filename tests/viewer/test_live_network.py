@@ -126,7 +126,14 @@ def test_a_viewer_that_does_not_start_says_its_last_words():
 
 
 def test_only_the_newest_of_each_key_is_shown():
-    assert newest([("a", b"1"), ("b", b"2"), ("a", b"3")]) == {"a": b"3", "b": b"2"}
+    assert newest([("a", b"1"), ("b", b"2"), ("a", b"3")]) == [("a", b"3"), ("b", b"2")]
+    samples = keys.imu("lab", "p01", "hand_r")
+    assert newest([(samples, b"1"), ("a", b"1"), (samples, b"2"), (f"{samples}/status", b"3")]) == [
+        ("a", b"1"),
+        (f"{samples}/status", b"3"),
+        (samples, b"1"),
+        (samples, b"2"),
+    ]
 
 
 def test_statistics_are_off_in_a_configuration_of_our_own():

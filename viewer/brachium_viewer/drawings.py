@@ -23,6 +23,26 @@ class Capsules:
     """(n, 4) red, green, blue, opacity."""
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Trail:
+    """Lines through points of the picture."""
+
+    strips: tuple[Floats, ...]
+    """(n, 3) m each."""
+    colours: tuple[Colour, ...]
+    """One a strip."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Signal:
+    """Values of a plot's three lines at times of their own; NaN breaks the lines."""
+
+    times_s: Floats
+    """(n,), on the picture's axis."""
+    values: Floats
+    """(n, 3)."""
+
+
 @dataclass(frozen=True, slots=True)
 class Degrees:
     """The value of one line of a plot; None when it is not known, and then the line is broken."""
@@ -81,6 +101,10 @@ class Layout:
     arms: tuple[Arm, ...]
     angles: tuple[str, ...]
     title: str
+    raw: tuple[tuple[str, str], ...] = ()
+    """Subject and segment of every sensor whose raw signals are shown."""
+    recorded: bool = False
+    """Whether it is of the past and can be played, to and fro."""
 
 
-Drawing = Capsules | Degrees | Range | Lane | Label | Text | Layout
+Drawing = Capsules | Trail | Signal | Degrees | Range | Lane | Label | Text | Layout

@@ -6,11 +6,15 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from brachium_viewer.drawings import Arm, Layout
+from brachium_viewer.raw_signals import KINDS
 from brachium_viewer.scene import (
     ARM_COLOUR,
     CHEST_HEIGHT,
+    ORANGE,
     PLOTS,
     QUALITY_COLOUR,
+    SKY,
+    VERMILION,
     Plot,
     line_colours,
     place_of,
@@ -19,6 +23,7 @@ from brachium_viewer.scene import (
 TIMELINE = "time"
 WINDOW_S = 20.0
 """How much of the past the plots show."""
+AXIS_COLOUR = {"x": VERMILION, "y": ORANGE, "z": SKY}
 _MARGIN_DEG = 12.0
 _REFERENCE = (120, 128, 134, 255)
 _TRUTH_LINE = (205, 208, 212, 255)
@@ -43,16 +48,53 @@ def blueprint(layout: Layout) -> Any:
     return rrb.Blueprint(
         rrb.Horizontal(
             rrb.Vertical(picture, words, row_shares=[3, 2]),
-            rrb.Vertical(*right, lanes, row_shares=[3, 1][1 - len(right) :]),
+            _side_panel(
+                rrb.Vertical(*right, lanes, row_shares=[3, 1][1 - len(right) :], name="Angles"), layout
+            ),
             column_shares=[10, 11],
         ),
-        rrb.TimePanel(state="collapsed", timeline=TIMELINE, play_state="following"),
+        rrb.TimePanel(
+            state="collapsed",
+            timeline=TIMELINE,
+            play_state="playing" if layout.recorded else "following",
+        ),
         rrb.TopPanel(state="hidden"),
         rrb.BlueprintPanel(state="hidden"),
         rrb.SelectionPanel(state="hidden"),
         auto_layout=False,
         auto_views=False,
     )
+
+
+def _side_panel(angles: Any, layout: Layout) -> Any:
+    """Return the angles' panel, with raw signals in a tab beside it where they were asked for."""
+    if not layout.raw:
+        return angles
+    rows = [
+        rrb.Horizontal(
+            *(
+                rrb.TimeSeriesView(
+                    origin=f"/raw/{subject}/{segment}/{kind}",
+                    name=f"{subject} {segment.replace('_', ' ')}: {words}",
+                    plot_legend=rrb.PlotLegend(visible=False),
+                    time_ranges=_window(),
+                )
+                for kind, words in KINDS.items()
+            )
+        )
+        for subject, segment in layout.raw
+    ]
+    return rrb.Tabs(angles, rrb.Vertical(*rows, name="Raw signals"), active_tab=1)
+
+
+def log_raw_lines(recording: rr.RecordingStream, layout: Layout) -> None:
+    """Log names and colours of the raw signals' axes, once a layout."""
+    for subject, segment in layout.raw:
+        for kind in KINDS:
+            lines = rr.SeriesLines(
+                colors=list(AXIS_COLOUR.values()), names=list(AXIS_COLOUR), widths=[1.4] * 3
+            )
+            recording.log(f"raw/{subject}/{segment}/{kind}", lines, static=True)
 
 
 def log_lanes(recording: rr.RecordingStream, path: str) -> None:

@@ -27,6 +27,8 @@ log = logging.getLogger(__name__)
 
 _TAILS = ("skeleton/*", "truth/*", "imu/*/status", "calibration")
 _INBOX = 4096
+MEMORY_LIMIT = "256MB"
+"""A quarter of an hour of both arms; a viewer that runs all day takes no more."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,10 +44,12 @@ class ViewSettings:
     """Port of the page on loopback; 0 takes any free one."""
     grpc_port: int = 9876
     """Port of the stream on loopback; 0 takes any free one."""
-    memory_limit: str = "256MB"
+    memory_limit: str = MEMORY_LIMIT
     """What the viewer and its server may keep of the past; the oldest goes first."""
     rate_hz: float = 30.0
     """Pictures a second; a machine without a graphics card keeps up with 10."""
+    raw: bool = False
+    """Show what the sensors send, too."""
     open_browser: bool = False
     on_address: Callable[[str], None] | None = None
     """Called with the page's address when it can be opened."""
@@ -56,28 +60,37 @@ def run(settings: ViewSettings, stop: threading.Event) -> None:
 
     Raises ViewError when Rerun is missing, a port is taken or the viewer fails, NoRouter without a router.
     """
-    if importlib.util.find_spec("rerun") is None:
-        raise ViewError("the live view needs Rerun: pip install 'brachium[view]'")
-    web = settings.web if settings.web is not None else not _has_display()
     with ExitStack() as stack:
         bus = stack.enter_context(Bus.open(settings.endpoint, stop=stop))
         heart = Heart(bus, settings.room, "view", f"view-{os.getpid()}")
+        tails = (*_TAILS, "imu/*") if settings.raw else _TAILS
         inboxes = [
-            bus.subscribe(keys.subjects(settings.room, tail, settings.subject), _INBOX) for tail in _TAILS
+            bus.subscribe(keys.subjects(settings.room, tail, settings.subject), _INBOX) for tail in tails
         ]
-        grpc_port = free_port(settings.grpc_port, "the viewer's stream")
-        files_port = free_port(0, "the viewer's files") if web else None
-        viewer = stack.enter_context(
-            ViewerProcess(grpc_port=grpc_port, memory_limit=settings.memory_limit, web_files_port=files_port)
-        )
-        viewer.wait_ready(stop)
-        heart.text = "in a window"
-        if files_port is not None:
-            page = PageServer(port=settings.web_port, grpc_port=grpc_port, viewer_files_port=files_port)
-            stack.enter_context(page)
-            heart.text = page.address
-            _tell(page.address, settings)
+        viewer, heart.text = opened(stack, settings, stop)
         _show(settings, stop, bus, heart, inboxes, viewer)
+
+
+def opened(stack: ExitStack, settings: ViewSettings, stop: threading.Event) -> tuple[ViewerProcess, str]:
+    """Return the viewer, ready, and where it is seen; it ends with the stack.
+
+    Raises ViewError when Rerun is missing, a port is taken or the viewer fails.
+    """
+    if importlib.util.find_spec("rerun") is None:
+        raise ViewError("the live view needs Rerun: pip install 'brachium[view]'")
+    web = settings.web if settings.web is not None else not _has_display()
+    grpc_port = free_port(settings.grpc_port, "the viewer's stream")
+    files_port = free_port(0, "the viewer's files") if web else None
+    viewer = stack.enter_context(
+        ViewerProcess(grpc_port=grpc_port, memory_limit=settings.memory_limit, web_files_port=files_port)
+    )
+    viewer.wait_ready(stop)
+    if files_port is None:
+        return viewer, "in a window"
+    page = PageServer(port=settings.web_port, grpc_port=grpc_port, viewer_files_port=files_port)
+    stack.enter_context(page)
+    _tell(page.address, settings)
+    return viewer, page.address
 
 
 def _has_display() -> bool:
@@ -132,16 +145,21 @@ def _show(
         screen.close(0.5)  # a frozen viewer does not let the thread end; its death, next, does
 
 
-def newest(messages: list[tuple[str, bytes]]) -> dict[str, bytes]:
-    """Return the last payload of each key: a view shows what is, not all that was."""
-    return dict(messages)
+def newest(messages: list[tuple[str, bytes]]) -> list[tuple[str, bytes]]:
+    """Return the last payload of each key, but all raw samples: a view shows what is, not all that was."""
+    raw = [item for item in messages if _is_raw(item[0])]
+    return [*{key: payload for key, payload in messages if not _is_raw(key)}.items(), *raw]
+
+
+def _is_raw(key: str) -> bool:
+    return key.rpartition("/")[0].endswith("/imu")  # not its status
 
 
 def draw(
-    news: dict[str, bytes], picture: Picture, screen: "Screen", now_s: float, drops: Counter[str]
+    news: list[tuple[str, bytes]], picture: Picture, screen: "Screen", now_s: float, drops: Counter[str]
 ) -> None:
     """Put one tick's news on the screen; what cannot be read is counted by its reason."""
-    for key, payload in news.items():
+    for key, payload in news:
         try:
             where = keys.parse(key)
             moment = picture.feed(

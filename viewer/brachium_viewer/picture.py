@@ -6,17 +6,22 @@ from dataclasses import dataclass, field
 from brachium_body.segments import SEGMENTS
 from brachium_viewer import panel
 from brachium_viewer.drawings import Arm, Drawing, Label, Layout, Range, Text
+from brachium_viewer.raw_signals import RawSignals
 from brachium_viewer.scene import (
+    ARM_COLOUR,
     CHEST_HEIGHT,
     PLOTS,
     draw_body,
     draw_silence,
     draw_skeleton,
+    hand_in_picture,
     lean,
     line_colours,
     place_of,
 )
-from brachium_wire.messages import Calibration, Message, Skeleton, Status
+from brachium_viewer.trails import HandTrail
+from brachium_wire.messages import Calibration, Message, SampleBatch, Skeleton, Status
+from brachium_wire.samples import read_samples
 from brachium_wire.topics import TOPICS
 
 SILENT_S = TOPICS["skeleton"].stale_after_s or 0.5
@@ -44,12 +49,16 @@ class _Subject:
     statuses: dict[str, Status] = field(default_factory=dict)
     offset_s: float | None = None
     body_lean: tuple[float, ...] = ()
+    trails: dict[str, HandTrail] = field(default_factory=dict)
+    raw: dict[str, RawSignals] = field(default_factory=dict)
 
 
 class Picture:
     """Feed it with messages; ask it often for what time alone changes. Times are s since the view began."""
 
-    def __init__(self) -> None:
+    def __init__(self, *, recorded: bool = False) -> None:
+        """`recorded`: the pictures are of the past and can be played."""
+        self._recorded = recorded
         self._subjects: dict[str, _Subject] = {}
         self._calibrations: dict[str, Calibration] = {}
         self._arms: list[Arm] = []
@@ -72,6 +81,8 @@ class Picture:
             self._calibrations[subject] = message
         elif isinstance(message, Status) and subject in self._subjects and detail in SEGMENTS:
             self._subjects[subject].statuses[detail] = message
+        elif isinstance(message, SampleBatch) and subject in self._subjects and detail in SEGMENTS:
+            return self._raw(subject, detail, message, now_s)
         return None
 
     def tick(self, now_s: float) -> dict[str, Drawing]:
@@ -83,6 +94,8 @@ class Picture:
                     subject.silent.add((side, truth))
                     last = (subject.truths if truth else subject.skeletons)[side]
                     out |= draw_silence(name, last, subject.place, truth=truth)
+                    if not truth:
+                        out[f"world/{name}/{side}_trail"] = subject.trails[side].end()
         if now_s - self._slow_s >= SLOW_S:
             self._slow_s = now_s
             out |= dict(self._words())
@@ -90,7 +103,13 @@ class Picture:
                 f"angles/{p.angle}/reference": Range(p.low, p.high) for p in PLOTS if p.angle in self._angles
             }
         layout = Layout(
-            tuple(self._arms), tuple(p.angle for p in PLOTS if p.angle in self._angles), self._title()
+            arms=tuple(self._arms),
+            angles=tuple(p.angle for p in PLOTS if p.angle in self._angles),
+            title=self._title(),
+            raw=tuple(
+                (name, seg) for name, one in self._subjects.items() for seg in SEGMENTS if seg in one.raw
+            ),
+            recorded=self._recorded,
         )
         at_once = self._arranged is None or not self._arranged.arms
         if layout != self._arranged and (at_once or now_s - self._changed_s > SETTLE_S):
@@ -113,7 +132,23 @@ class Picture:
         drawings = draw_skeleton(name, skeleton, subject.place, truth=truth)
         if not truth or not subject.skeletons:
             drawings |= self._body(name, subject, skeleton)
-        return self._moment(subject, skeleton, now_s), drawings
+        time_s = self._moment(subject, skeleton, now_s)
+        if not truth:
+            colour = ARM_COLOUR[line_colours(self._arms)[name, skeleton.side]]
+            trail = subject.trails.setdefault(skeleton.side, HandTrail(colour))
+            path = trail.take(time_s, hand_in_picture(skeleton, subject.place))
+            if path is not None:
+                drawings[f"world/{name}/{skeleton.side}_trail"] = path
+        return time_s, drawings
+
+    def _raw(self, name: str, segment: str, batch: SampleBatch, now_s: float) -> Moment:
+        """Take samples of somebody whose skeletons come: they give the samples their place in time."""
+        subject = self._subjects[name]
+        if segment not in subject.raw:
+            subject.raw[segment] = RawSignals()
+            self._changed_s = now_s
+        offset_s = subject.offset_s or 0.0
+        return now_s, subject.raw[segment].take(f"raw/{name}/{segment}", read_samples(batch), offset_s)
 
     def _body(self, name: str, subject: _Subject, skeleton: Skeleton) -> Iterator[tuple[str, Drawing]]:
         tilt = tuple(round(float(x), 3) for x in lean(skeleton))

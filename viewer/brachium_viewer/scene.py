@@ -14,7 +14,7 @@ import numpy as np
 
 from brachium_body import rotation
 from brachium_body.ranges import REFERENCE
-from brachium_body.segments import SEGMENTS
+from brachium_body.segments import SEGMENTS, part_of
 from brachium_viewer.drawings import Arm, Capsules, Colour, Degrees, Drawing, Floats, Lane
 from brachium_wire.messages import Quality, Skeleton
 
@@ -132,6 +132,16 @@ def draw_arm(skeleton: Skeleton, place: float, *, truth: bool = False) -> Capsul
     if truth:
         rows = [(start, end, 0.8 * radius, TRUTH) for start, end, radius, _ in rows]
     return _capsules(rows, skeleton, place)
+
+
+def hand_in_picture(skeleton: Skeleton, place: float) -> Floats | None:
+    """Return where the hand (without one, the wrist) is drawn, (3,) m; None when that is not measured now."""
+    at = skeleton.positions.get("hand", skeleton.positions.get("wrist"))
+    poses = [pose for name, pose in skeleton.segments.items() if part_of(name) in PART_COLOUR]
+    if at is None or not all(pose.quality in _SOLID for pose in poses):
+        return None
+    point: Floats = _capsules([(at, at, 0.0, JOINT)], skeleton, place).starts[0]
+    return point
 
 
 def draw_body(skeleton: Skeleton | None, place: float) -> Capsules:

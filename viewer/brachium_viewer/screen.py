@@ -9,7 +9,19 @@ import rerun as rr
 
 from brachium_body import rotation
 from brachium_viewer import layout
-from brachium_viewer.drawings import Capsules, Degrees, Drawing, Label, Lane, Layout, Range, Text
+from brachium_viewer.drawings import (
+    Capsules,
+    Degrees,
+    Drawing,
+    Label,
+    Lane,
+    Layout,
+    Range,
+    Signal,
+    Text,
+    Trail,
+)
+from brachium_viewer.raw_signals import joined
 
 log = logging.getLogger(__name__)
 
@@ -17,6 +29,9 @@ APPLICATION = "brachium"
 WHITE = (240, 240, 240, 255)
 FLUSH_EVERY = 30
 """Deliveries between two waits for the viewer, so that a frozen one cannot fill the sender's memory."""
+
+
+TRAIL_RADIUS = 0.005
 
 
 class Mailbox:
@@ -31,8 +46,13 @@ class Mailbox:
     def put(self, seconds: float, drawings: Mapping[str, Drawing]) -> None:
         """Leave the drawings of one moment; never waits for the reader."""
         with self._ready:
-            self.replaced += len(self._waiting.keys() & drawings.keys())
-            self._waiting.update({path: (seconds, drawing) for path, drawing in drawings.items()})
+            for path, drawing in drawings.items():
+                before = self._waiting.get(path)
+                if before is not None and isinstance(drawing, Signal) and isinstance(before[1], Signal):
+                    self._waiting[path] = (seconds, joined(before[1], drawing))
+                    continue
+                self.replaced += before is not None
+                self._waiting[path] = (seconds, drawing)
             self._ready.notify()
 
     def take(self) -> dict[str, tuple[float, Drawing]] | None:
@@ -76,6 +96,12 @@ class Pen:
         match drawing:
             case Capsules():
                 log_one(path, capsules(drawing))
+            case Trail():
+                log_one(path, rr.LineStrips3D(drawing.strips, colors=drawing.colours, radii=TRAIL_RADIUS))
+            case Signal():
+                time = rr.TimeColumn(layout.TIMELINE, duration=drawing.times_s)
+                columns = rr.Scalars.columns(scalars=drawing.values.reshape(-1))
+                self._recording.send_columns(path, [time], columns.partition([3] * len(drawing.times_s)))
             case Degrees(value=None):
                 if path not in self._broken:  # a gap stays a gap: the line is not drawn across it
                     self._broken.add(path)
@@ -96,6 +122,7 @@ class Pen:
                 log_one(path, rr.TextDocument(drawing.markdown, media_type="text/markdown"))
             case Layout():
                 layout.log_lines(self._recording, drawing)
+                layout.log_raw_lines(self._recording, drawing)
                 self._recording.send_blueprint(layout.blueprint(drawing), make_active=True, make_default=True)
 
     def _lane(self, path: str, quality: str) -> None:
