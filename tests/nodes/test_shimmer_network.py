@@ -133,12 +133,13 @@ def test_a_subject_that_comes_in_elsewhere_is_left_alone(endpoint, bus, waiting,
     assert "comes in through host another" in str(failed[0])
 
 
-def test_a_port_that_is_not_there_is_told_and_waited_for(endpoint, listening, waiting, tmp_path):
+def test_a_port_that_is_not_there_is_told_and_waited_for(endpoint, listening, waiting, tmp_path, caplog):
     heard = listening("shim4")
     with serving(endpoint, tmp_path / "nothing", "shim4"):
         waiting(
             lambda: any("No such file" in h.text for h in messages(heard, "health", Health)), "its complaint"
         )
+        assert "No such file or directory; it is tried again until it is there" in caplog.text
 
 
 def test_a_file_is_no_port(tmp_path):
