@@ -41,9 +41,7 @@ def keep(recording: Path, subject: str) -> Json:
 
     page = report_page(recording)
     try:
-        report.write(
-            report.ReportSettings(recording=recording, out=page, sessions=folder, subject=subject)
-        )
+        report.write(report.ReportSettings(recording=recording, out=page, sessions=folder, subject=subject))
     except MissingExtra as error:
         return {"report": None, "why": str(error)}
     return {"report": report_link(page), "why": ""}
