@@ -16,7 +16,7 @@ from urllib.parse import urlsplit
 
 import pytest
 from axe_playwright_python.sync_playwright import Axe
-from playwright.sync_api import sync_playwright
+from playwright.sync_api import Error, sync_playwright
 
 from brachium.checks import free_port
 from brachium.demo_network import site_text
@@ -39,7 +39,7 @@ FLAGS = [
     "--no-first-run",
 ]
 ROOM = "demo"
-UP_S = 40.0
+UP_S = 90.0
 LOOK_S = 0.05
 TOKEN = "of-this-test"
 DRESS = """async ([language, theme, percent]) => {
@@ -129,7 +129,7 @@ class Screen:
         **device: Any,
     ) -> None:
         """`own_letters`: the page itself sets the size of letters; else the browser does."""
-        self.network, self.label, self.folder = network, label, PICTURES
+        self.network, self.label = network, label
         self.context = browser.new_context(
             viewport={"width": size[0], "height": size[1]},
             locale="en-GB",
@@ -170,7 +170,18 @@ class Screen:
         """Keep a picture of the step reached."""
         self.steps += 1
         PICTURES.mkdir(parents=True, exist_ok=True)
-        self.page.screenshot(path=str(PICTURES / f"{self.label}-{self.steps:02d}-{step}.png"))
+        self.keep(self.page, f"{self.steps:02d}-{step}")
+
+    def keep(self, page: Any, name: str, **how: Any) -> None:
+        """Take a picture; a browser that draws without a graphics card may fail to give one at once."""
+        for left in (2, 1, 0):
+            try:
+                page.screenshot(path=str(PICTURES / f"{self.label}-{name}.png"), **how)
+                return
+            except Error:
+                if not left:
+                    raise
+                page.wait_for_timeout(500)
 
     def until(self, found: Callable[[], bool]) -> None:
         """Wait for something on the page: its policy forbids what a browser's driver would wait with."""
@@ -212,7 +223,7 @@ class Screen:
             if axe:
                 found += [f"{dressed}: {barrier}" for barrier in self.barriers()]
             if percent == 200:
-                self.page.screenshot(path=str(PICTURES / f"{self.label}-{step}-{language}-{percent}.png"))
+                self.keep(self.page, f"{step}-{language}-{percent}")
         self.dress("en", "light", 100)
         self.found += found
 
