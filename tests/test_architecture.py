@@ -26,7 +26,7 @@ LARGEST_LINES = 250
 LARGER = {
     "brachium_wire.bus": 380,  # the one module that knows Zenoh: all of it in one place
     "brachium_wire.messages": 280,  # one record after the other, each field with its words
-    "brachium_fusion.subject": 340,  # what is known of one subject, and all that may change it, in one order
+    "brachium_fusion.subject": 339,  # what is known of one subject, and all that may change it, in one order
     "brachium_fusion.pose": 260,  # forward and mounting are found together, from the same samples
 }
 """Modules that are larger than a file should be, and how large at most: a limit here may only fall."""

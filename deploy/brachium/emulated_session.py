@@ -19,7 +19,7 @@ from brachium.evaluation.loss import kept
 from brachium.evaluation.solving import solved
 from brachium.evaluation.trials import GUIDED, Trial
 from brachium_body.segments import Side
-from brachium_fusion import from_capture
+from brachium_fusion import capture_batches
 from brachium_nodes.sensors import Level
 from brachium_viewer import marks
 from brachium_wire import keys, recording
@@ -97,7 +97,7 @@ def _part(
     made = Emulated(replace(trial, seconds=length_s - begins_s))
     skeletons = _solved(made)
     for skeleton in skeletons:
-        at = begin_ns + skeleton.time_ns - from_capture.ZERO_NS
+        at = begin_ns + skeleton.time_ns - capture_batches.ZERO_NS
         moved = msgspec.structs.replace(skeleton, time_ns=at, origin="emulated")
         yield at + ARRIVES_NS, keys.skeleton(ROOM, SUBJECT, part.side), moved
     yield from _sensors(made, begin_ns, sent)

@@ -115,14 +115,10 @@ class Interval:
 
     def at(self, index: int | slice) -> "Interval":
         """Return one of many intervals, or some."""
-        return Interval(
-            self.turn[index],
-            self.angle[index],
-            self.spread[index],
-            self.push[index],
-            self.squared[index],
-            self.span_s,
+        turn, angle, spread, push, squared = (
+            a[index] for a in (self.turn, self.angle, self.spread, self.push, self.squared)
         )
+        return Interval(turn, angle, spread, push, squared, self.span_s)
 
 
 @dataclass(slots=True, eq=False)

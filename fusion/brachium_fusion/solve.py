@@ -12,6 +12,7 @@ import numpy.typing as npt
 from brachium_fusion import best, from_capture, from_recording
 from brachium_fusion.best_arm import solve_arm
 from brachium_fusion.best_material import Material
+from brachium_fusion.capture_batches import nanoseconds
 from brachium_fusion.orientation import FilterName
 from brachium_fusion.result_quality import assumptions
 from brachium_fusion.settings import Settings
@@ -75,7 +76,7 @@ def _split(name: FilterName | ZhouName | None) -> tuple[ZhouName | None, FilterN
 def _capture(settings: SolveSettings) -> Outcome:
     capture = captures.load(settings.input)
     times = from_capture.output_times(capture, settings.rate_hz)
-    times_ns = from_capture.nanoseconds(times).tolist()
+    times_ns = nanoseconds(times).tolist()
     zhou, filter_name = _split(settings.filter)
     chosen = Settings(filter=filter_name or "auto", magnetometer=settings.magnetometer, auto_pose=False)
     if settings.mode == "best" or zhou:

@@ -281,13 +281,8 @@ class Subject:
         )
 
     def _known(self) -> Known:
-        return Known(
-            self.calibrating.alignment,
-            lengths_of(self.session),
-            self.stated,
-            self.tracks,
-            self._settings.shoulder,
-        )
+        alignment, lengths = self.calibrating.alignment, lengths_of(self.session)
+        return Known(alignment, lengths, self.stated, self.tracks, self._settings.shoulder)
 
     # -- changes and poses -------------------------------------------------------------------------------
 

@@ -10,7 +10,8 @@ from brachium_body import rotation
 from brachium_fusion.bridging import SIDE, bridge
 from brachium_fusion.calibrated import Calibrated
 from brachium_fusion.orientation import FilterName, OrientationFilter, make
-from brachium_fusion.timeline import Block, Carried, Moved, Timeline
+from brachium_fusion.sample_block import Block, Carried, Moved
+from brachium_fusion.timeline import Timeline
 from brachium_wire.codec import Drop
 from brachium_wire.messages import Info, Quality
 from brachium_wire.samples import Samples
@@ -21,8 +22,7 @@ Floats = npt.NDArray[np.float64]
 BRIDGE_NS = 100_000_000
 """A gap up to this is bridged by interpolation when its far end is there, and marked held."""
 CARRIED_NS = 150_000_000
-"""What was bridged of a gap up to this is kept for those who follow a sensor sample by sample; nobody waits
-for the far end of a longer one."""
+"""What was bridged of a gap up to this is kept for those who follow a sensor sample by sample."""
 RESTART_NS = 500_000_000
 """After a longer gap the filter starts anew: what it would carry over is further off than a fresh start."""
 SETTLE_NS = 5_000_000_000

@@ -7,7 +7,7 @@ from scipy.spatial.transform import Rotation
 from brachium_body import rotation
 from brachium_body.angles import COLUMNS
 from brachium_body.segments import arm_segments
-from brachium_fusion.from_capture import batches, numbers
+from brachium_fusion.capture_batches import batches, numbers
 from brachium_fusion.solve import SolveError, SolveSettings, run
 from brachium_wire import table
 from brachium_wire.capture import CaptureSegment, load

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from brachium_body import rotation
-from brachium_fusion.from_capture import batches, infos
+from brachium_fusion.capture_batches import batches
+from brachium_fusion.from_capture import infos
 from brachium_fusion.solve import SolveSettings, run
 from brachium_fusion.track import SegmentTrack
 from brachium_wire import capture, table

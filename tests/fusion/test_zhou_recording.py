@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from msgspec import structs
 
-from brachium_fusion.from_capture import ZERO_NS
+from brachium_fusion.capture_batches import ZERO_NS
 from brachium_fusion.solve import SolveError, SolveSettings, run
 from brachium_nodes.session import SessionArrays, session_arrays
 from brachium_nodes.wearer import WearerSettings

@@ -14,7 +14,7 @@ from brachium.evaluation.trials import Trial, joints, spans
 from brachium_body.angles import COLUMNS
 from brachium_body.kinematics import JOINTS
 from brachium_body.segments import Segment, Side, arm_segments
-from brachium_fusion import from_capture
+from brachium_fusion.capture_batches import ZERO_NS
 from brachium_nodes.person import TRANSITION_S, Person
 from brachium_nodes.session import ArmArrays, SensorArrays, SessionArrays, session_arrays
 from brachium_wire import capture as captures
@@ -135,7 +135,7 @@ def estimate(
     positions = {j: np.full((n, 3), np.nan) for j in JOINTS}
     angles, shift = {c: np.full(n, np.nan) for c in COLUMNS}, np.full((n, 3), np.nan)
     for skeleton in skeletons:
-        i = row_of.get(round(1e-3 * (skeleton.time_ns - from_capture.ZERO_NS)))
+        i = row_of.get(round(1e-3 * (skeleton.time_ns - ZERO_NS)))
         if i is None or skeleton.side != side:
             continue
         missing = any(pose.world_from_segment is None for pose in skeleton.segments.values())

@@ -13,7 +13,7 @@ from brachium.evaluation.errors import relative_angle
 from brachium.evaluation.solving import solved
 from brachium_body import rotation
 from brachium_body.segments import Segment
-from brachium_fusion.from_capture import ZERO_NS
+from brachium_fusion.capture_batches import ZERO_NS
 from brachium_wire import capture as captures
 from brachium_wire import table
 from brachium_wire.capture_settings import CaptureSettings, read_settings
