@@ -11,7 +11,10 @@ _SHARES = ("covered", "covered_worst", "samples_off", "valid_before", "accel_sca
 
 def lines(figures: Any) -> list[str]:
     """Return a line for each figure of a dataclass; those of an inner one stand under its name."""
-    return _lines(asdict(figures) if is_dataclass(figures) and not isinstance(figures, type) else figures, "")
+    plain: Any = figures
+    if is_dataclass(figures) and not isinstance(figures, type):
+        plain = asdict(figures)
+    return _lines(plain, "")
 
 
 def _lines(figures: Mapping[str, Any], indent: str) -> list[str]:

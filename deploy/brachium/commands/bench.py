@@ -96,7 +96,7 @@ def _other(args: argparse.Namespace) -> int:
     elif args.report:
         from brachium import bench_report
 
-        found = bench_report.measure(*((8.0, 1) if args.quick else ()))
+        found = bench_report.measure(8.0, 1) if args.quick else bench_report.measure()
     elif args.clock:
         from brachium import bench_clock
 

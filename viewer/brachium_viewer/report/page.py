@@ -146,15 +146,15 @@ def page(report: Report) -> str:
 def movement_charts(report: Report) -> list[Chart]:
     """Return one row of figures for each exercise and arm that was repeated."""
     drawn = []
-    for key in dict.fromkeys((g.side, g.exercise.name) for g in report.groups):
-        found, motion = of_movement(report, *key)
+    for side, name in dict.fromkeys((g.side, g.exercise.name) for g in report.groups):
+        found, motion = of_movement(report, side, name)
         counts = {g.mode: len(g.pooled.repetitions) for g in found}
         if not any(counts.values()):
             continue
         lines = movement_lines(found, motion, report.zero_ns)
         label = ", ".join(f"{n} {mode}" for mode, n in counts.items())
-        svg = report_charts.movement("-".join(key), lines)
-        drawn.append(Chart(words.movement(key[1], key[0]).capitalize(), f"{label} repetitions", svg))
+        svg = report_charts.movement(f"{side}-{name}", lines)
+        drawn.append(Chart(words.movement(name, side).capitalize(), f"{label} repetitions", svg))
     return drawn
 
 
