@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from brachium_body.segments import Side
 from brachium_viewer import contents as c
 from brachium_viewer import figures as f
 from brachium_viewer.marks import ExerciseBegins
@@ -146,7 +147,8 @@ def page(report: Report) -> str:
 def movement_charts(report: Report) -> list[Chart]:
     """Return one row of figures for each exercise and arm that was repeated."""
     drawn = []
-    for side, name in dict.fromkeys((g.side, g.exercise.name) for g in report.groups):
+    moved: dict[tuple[Side, str], None] = dict.fromkeys((g.side, g.exercise.name) for g in report.groups)
+    for side, name in moved:
         found, motion = of_movement(report, side, name)
         counts = {g.mode: len(g.pooled.repetitions) for g in found}
         if not any(counts.values()):
