@@ -19,8 +19,8 @@ from brachium_fusion.joint_update import GRAVITY
 HEADINGS = 72
 LEAST_ACCELERATION = 0.3
 """m/s^2: below it accelerometer bias and tilt error, not movement, give the direction."""
-ABOVE_SHAKING = 2.0
-"""Times the shaking: skin lets a sensor swing even against its bone, time and again in the same way."""
+ABOVE_SHAKING = 1.0
+"""Times the shaking: what skin swings by says nothing of heading, what goes beyond it does."""
 ACCELERATION_SD = 0.3
 """m/s^2: lever arms, bias, tilt."""
 RATE_SD = 0.3

@@ -14,7 +14,7 @@ from brachium_body.segments import Segment
 from brachium_fusion.calibrated import Calibrated
 from brachium_fusion.sensor_fits import WHATS
 from brachium_nodes.calibration_bench import CalibrationBench
-from brachium_nodes.known_calibrations import calibrations_in
+from brachium_nodes.known_calibrations import KnownCalibrations
 from brachium_nodes.sensors import FIELD_UT, G
 from brachium_nodes.wearer import WearerSettings
 from brachium_wire import calibration_file as kept
@@ -92,7 +92,7 @@ def test_raw_readings_come_out_calibrated_at_the_gateway(
     assert main(["sensor", str(recorded), "--out", str(tmp_path / "kept")]) == 0
     said = capsys.readouterr().out
     assert f"{NODE} on {SEGMENT}" in said
-    found = calibrations_in(tmp_path / "kept")(NODE)
+    found = KnownCalibrations(tmp_path / "kept").of(NODE, SensorCalibration())
     errors = off(found, bench)
     assert errors["gyr_dps"] < 0.05
     assert errors["acc"] < 0.003 * G

@@ -259,9 +259,12 @@ def network(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Network]:
         yield one
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def browser() -> Iterator[Any]:
-    """Debian's Chromium; where everything must run, a missing one is a failure."""
+    """Debian's Chromium; where everything must run, a missing one is a failure.
+
+    It ends with its module: its driver keeps an event loop running, beside which other tests could begin none.
+    """
     missing = "" if CHROMIUM.exists() else f"no browser at {CHROMIUM}; set BRACHIUM_CHROMIUM"
     if missing and os.environ.get("CI") == "true":
         pytest.fail(missing)
