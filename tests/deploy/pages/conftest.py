@@ -263,7 +263,7 @@ def network(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Network]:
 def browser() -> Iterator[Any]:
     """Debian's Chromium; where everything must run, a missing one is a failure.
 
-    It ends with its module: its driver keeps an event loop running, beside which other tests could begin none.
+    It ends with its module: its driver keeps an event loop running, and other tests need one of their own.
     """
     missing = "" if CHROMIUM.exists() else f"no browser at {CHROMIUM}; set BRACHIUM_CHROMIUM"
     if missing and os.environ.get("CI") == "true":
