@@ -35,6 +35,9 @@ FIRST_PAUSE_S, LONGEST_PAUSE_S = 0.5, 30.0
 class Busy(RuntimeError):
     """The subject comes in through another host; the text says which."""
 
+    def __init__(self, subject: str, host: str | None) -> None:
+        super().__init__(f"{subject} comes in through host {host}; end that one first")
+
 
 @dataclass(frozen=True, kw_only=True)
 class ShimmerSettings:
@@ -112,14 +115,19 @@ class ShimmerService:
         for _ in range(round(seconds / LOOK_S)):
             if stop.wait(LOOK_S) or (away and Path(self._settings.port).exists()):
                 return
+            self._give_way()
             self._heart.beat()
 
     def _claim(self) -> None:
-        settings = self._settings
-        other = self._claims.other(settings.subject)
-        if other is not None:
-            raise Busy(f"{settings.subject} comes in through host {other}; end that one first")
-        self._claims.claim(settings.subject)
+        subject = self._settings.subject
+        if (other := self._claims.other(subject)) is not None:
+            raise Busy(subject, other)
+        self._claims.claim(subject)
+
+    def _give_way(self) -> None:
+        """Raise Busy for a host that was there before, and that was heard of only since."""
+        if self._claims.yields(self._settings.subject):
+            raise Busy(self._settings.subject, self._claims.other(self._settings.subject))
 
     def _set_up(self, port: SerialPort, stop: threading.Event) -> Device | None:
         """Return the device once it streams, or None when `stop` came first."""
@@ -127,6 +135,7 @@ class ShimmerService:
         port.write(dialogue.begin())
         while not stop.is_set():
             self._heart.beat()
+            self._give_way()
             data = port.read(LOOK_S)
             now_ns = self._clock.now_ns()
             answer = dialogue.receive(data, now_ns) if data else dialogue.tick(now_ns)
@@ -190,8 +199,7 @@ class ShimmerService:
                 if now_ns >= battery_ns:
                     battery_ns += BATTERY_NS
                     port.write(BATTERY.words)
-                if self._claims.yields(settings.subject):
-                    raise Busy(f"{settings.subject} comes in through {self._claims.other(settings.subject)}")
+                self._give_way()
                 self._heart.beat()
             port.write(STOP.words)
         finally:
@@ -212,11 +220,9 @@ class ShimmerService:
             except WireError as error:
                 memory.drops[error.drop.value] += len(frame.offsets) // 4
                 continue
-            if batch is None:
-                continue
-            self._heart.counts["samples"] += len(batch.offsets) // 4
-            key = keys.imu(settings.room, settings.subject, settings.segment)
-            self._bus.put(key, encode(batch))
+            if batch is not None:
+                self._heart.counts["samples"] += len(batch.offsets) // 4
+                self._bus.put(keys.imu(settings.room, settings.subject, settings.segment), encode(batch))
 
     def _tell(self, now_ns: int, *, connected: bool) -> None:
         assert self._stream is not None
