@@ -82,7 +82,7 @@ def _table(context: Context, level: Level) -> Table:
         within = float(np.percentile(errors, 95.0)) if len(errors) else None
         total = sum(len(s.measured.repetitions) for s in sessions)
         given = sum(len(values(s.measured.repetitions, "range")) for s in sessions)
-        smooth = [_smoothness_off(s) for s in sessions if s.exact]
+        smooth = [off for s in sessions if s.exact and (off := _smoothness_off(s)) is not None]
         rows.append(
             (
                 kind,
@@ -186,6 +186,6 @@ def _words(known: Floats) -> npt.NDArray[np.str_]:
     return np.where(np.isfinite(known), "good", "missing")
 
 
-def _smoothness_off(one: Session) -> float:
+def _smoothness_off(one: Session) -> float | None:
     ours, true = one.measured.medians["sparc"].value, one.true.medians["sparc"].value
-    return abs(ours - true) if ours is not None and true is not None else float("nan")
+    return None if ours is None or true is None else abs(ours - true)

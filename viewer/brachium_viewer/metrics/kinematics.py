@@ -47,12 +47,6 @@ def angular_speed(time_s: Floats, values: Floats) -> tuple[Floats, Floats]:
     return grid, np.asarray(np.gradient(smoothed, 1.0 / RATE_HZ, axis=0), dtype=np.float64)
 
 
-def speed_of(time_s: Floats, places: Floats) -> tuple[Floats, Floats]:
-    """Return an even grid (m,) s and the speed (m,) along a path (n, 3)."""
-    grid, velocity = angular_speed(time_s, places)
-    return grid, np.asarray(np.linalg.norm(velocity, axis=1), dtype=np.float64)
-
-
 def path(time_s: Floats, places: Floats) -> tuple[float, float]:
     """Return the length of a path (n, 3) in its unit, and its straightness: the distance between its ends
     over that length, 0 to 1; NaN for one with a gap or without a way."""

@@ -14,7 +14,6 @@ from brachium_viewer.metrics.repetition_measures import (
     RepetitionMeasures,
     count,
     repetition_measures,
-    rising,
 )
 
 FEW = 5
@@ -136,6 +135,3 @@ def loss_between(active: SetMeasures, passive: SetMeasures) -> Measure:
     if active.best_peak.value is None or passive.best_peak.value is None:
         return withheld("one of both is not known", "deg")
     return measure(abs(passive.best_peak.value - active.best_peak.value), "deg")
-
-
-__all__ = ["FEW", "SetMeasures", "loss_between", "rising", "set_measures", "together", "values"]
