@@ -1,4 +1,5 @@
 import os
+import signal
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
@@ -23,6 +24,15 @@ def _children_see_the_source() -> Iterator[None]:
         else:
             patch.delenv("PYTHONPATH", raising=False)
         yield
+
+
+@pytest.fixture(autouse=True)
+def _signals() -> Iterator[None]:
+    """Put back what a command that ran in this process hears of signals."""
+    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+    yield
+    for number, handler in before.items():
+        signal.signal(number, handler)
 
 
 def brachium(*words: str, timeout_s: float = 60.0) -> subprocess.CompletedProcess[str]:

@@ -1,7 +1,6 @@
 """`brachium calibrate` against fusion on a router: what it says, how it ends, what is kept."""
 
 import json
-import signal
 import threading
 from collections.abc import Iterator
 from pathlib import Path
@@ -20,15 +19,6 @@ from brachium_wire.bus import Bus
 pytestmark = pytest.mark.network
 
 ROOM = "guided"
-
-
-@pytest.fixture(autouse=True)
-def signals() -> Iterator[None]:
-    """Put back what a command hears of signals."""
-    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
-    yield
-    for number, handler in before.items():
-        signal.signal(number, handler)
 
 
 @pytest.fixture

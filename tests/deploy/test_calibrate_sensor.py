@@ -2,7 +2,6 @@
 
 import json
 import re
-import signal
 import threading
 from collections.abc import Iterator
 from dataclasses import replace
@@ -25,15 +24,6 @@ from brachium_wire.sensor_records import SensorProgress
 
 ROOM = "sensors"
 SEGMENT = "forearm_r"
-
-
-@pytest.fixture(autouse=True)
-def signals() -> Iterator[None]:
-    """Put back what a command hears of signals."""
-    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
-    yield
-    for number, handler in before.items():
-        signal.signal(number, handler)
 
 
 @pytest.fixture(scope="module")

@@ -1,9 +1,7 @@
 """`brachium wear-check`: what is told of a capture, of a recording, and of a wearer who is led through it."""
 
 import json
-import signal
 import threading
-from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 
@@ -35,15 +33,6 @@ SWAP: dict[Segment, Segment] = {"forearm_r": "hand_r", "hand_r": "forearm_r"}
 FLIP: dict[Segment, Turn] = {"upper_arm_r": "upside-down"}
 WRONG = Wearing(seats=SWAP, turned=FLIP)
 START_NS = 1_700_000_000_000_000_000
-
-
-@pytest.fixture(autouse=True)
-def signals() -> Iterator[None]:
-    """Put back what a command hears of signals."""
-    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
-    yield
-    for number, handler in before.items():
-        signal.signal(number, handler)
 
 
 @cache
