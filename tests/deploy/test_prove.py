@@ -71,3 +71,10 @@ def test_a_command_that_fails_is_said(tmp_path: Path):
     with pytest.raises(prove.Failed, match=r"nothing\.mcap"):
         prove.prove(broken, tmp_path, Path("nowhere"))
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_command_that_hangs_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(prove, "LONGEST_S", 0.01)
+    slow = Proof(name="x", commands=(("router", "--help"),), promises=(promise(1.0),))
+    with pytest.raises(prove.Failed, match="not done in"):
+        prove.prove(slow, tmp_path, Path("nowhere"))
