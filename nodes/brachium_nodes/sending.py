@@ -2,6 +2,7 @@
 
 import asyncio
 import logging
+import time
 from collections.abc import Callable, Coroutine
 from typing import Protocol
 
@@ -10,10 +11,10 @@ import msgspec
 from brachium_nodes.node_client import NodeClient, NoGateway, NotWelcome
 from brachium_nodes.node_frames import NodeStatus
 from brachium_nodes.node_stream import LOOK_S, Counting, NodeStream, Outgoing, Stop, StreamCount, Timeline
+from brachium_nodes.pauses import Pauses
 
 log = logging.getLogger(__name__)
 
-RETRY_S = 0.5
 STATUS_S = 1.0
 JOIN_WITHIN_S = 1.0
 
@@ -36,24 +37,61 @@ class Sink(Protocol):
         """Leave, so that the other side's counts are final."""
 
 
-async def send_all(
-    stream: NodeStream, sink: Sink, joining: asyncio.Task[None], timeline: Timeline, end_s: float, stop: Stop
-) -> StreamCount:
+class Entrant:
+    """One node on its way in, again and again."""
+
+    def __init__(self, stream: NodeStream, sink: Sink, stop: Stop) -> None:
+        self.stream, self.sink = stream, sink
+        self._stop, self._pauses = stop, Pauses(stream.hello.node)
+        self.joining = asyncio.create_task(self._join())
+
+    def again(self) -> None:
+        """Join anew: the connection broke."""
+        self.joining = asyncio.create_task(self._join(self._pauses.next_s(time.monotonic())))
+
+    async def _join(self, wait_s: float = 0.0) -> None:
+        """Try to join until it works or `stop` is set. Raises NotWelcome when trying again makes no sense."""
+        said = ""
+        await self._rest(wait_s)
+        while not self._stop.is_set():
+            try:
+                await self.sink.join()
+                self._pauses.joined(time.monotonic())
+                return
+            except NoGateway as error:
+                reason, wanted_s = str(error), 0.0
+            except NotWelcome as error:
+                if error.retry_s is None:
+                    raise
+                reason, wanted_s = str(error), error.retry_s
+            if reason != said:
+                log.warning("%s: %r", self.stream.hello.node, reason)
+            said = reason
+            await self._rest(self._pauses.next_s(time.monotonic(), wanted_s))
+
+    async def _rest(self, wait_s: float) -> None:
+        for _ in range(round(wait_s / LOOK_S)):
+            if not self._stop.is_set():
+                await asyncio.sleep(LOOK_S)
+
+
+async def send_all(entrant: Entrant, timeline: Timeline, end_s: float, stop: Stop) -> StreamCount:
     """Send a stream's packets, each at its time, until it ends, `end_s` or `stop` comes; then leave.
 
     While there is no connection packets are dropped and counted, as a node does, and joining is tried again.
     Raises NotWelcome when trying again makes no sense.
     """
+    stream, sink = entrant.stream, entrant.sink
     counting, told_s = Counting(), timeline.now_s()
     try:
         for packet in stream.packets:
             if packet.due_s > end_s or not await timeline.reach(packet.due_s, stop):
                 break
             samples = len(packet.batch.offsets) // 4
-            if not joining.done():
+            if not entrant.joining.done():
                 counting.count.dropped += samples
                 continue
-            joining.result()
+            entrant.joining.result()
             try:
                 await sink.send(packet)
                 counting.sent(packet.batch.sequence, samples)
@@ -63,32 +101,11 @@ async def send_all(
                     await sink.tell(msgspec.structs.replace(said, dropped=counting.count.dropped))
             except ConnectionError:
                 counting.count.dropped += samples
-                joining = asyncio.create_task(join(stream, sink, stop))
+                entrant.again()
     finally:
-        joining.cancel()
+        entrant.joining.cancel()
         await sink.leave(counting.count.next_sequence)
     return counting.count
-
-
-async def join(stream: NodeStream, sink: Sink, stop: Stop) -> None:
-    """Try to join until it works or `stop` is set. Raises NotWelcome when trying again makes no sense."""
-    said = ""
-    while not stop.is_set():
-        try:
-            return await sink.join()
-        except NoGateway as error:
-            reason, wait_s = str(error), RETRY_S
-        except NotWelcome as error:
-            if error.retry_s is None:
-                raise
-            reason, wait_s = str(error), max(error.retry_s, RETRY_S)
-        if reason != said:
-            log.warning("%s: %r", stream.hello.node, reason)
-        said = reason
-        for _ in range(round(wait_s / LOOK_S)):
-            if not stop.is_set():
-                await asyncio.sleep(LOOK_S)
-    return None
 
 
 async def send_streams(
@@ -98,7 +115,8 @@ async def send_streams(
 
     Returns the counts by (subject, segment). Time begins when one has joined and the others had a second.
     """
-    joining = [asyncio.create_task(join(stream, sink, stop)) for stream, sink in nodes]
+    entrants = [Entrant(stream, sink, stop) for stream, sink in nodes]
+    joining = [entrant.joining for entrant in entrants]
     try:
         await asyncio.wait(joining, return_when=asyncio.FIRST_COMPLETED)
         await asyncio.wait(joining, timeout=JOIN_WITHIN_S)
@@ -110,18 +128,15 @@ async def send_streams(
         timeline.start()
         async with asyncio.TaskGroup() as group:
             beside = group.create_task(started())
-            sending = [
-                group.create_task(send_all(stream, sink, task, timeline, end_s, stop))
-                for (stream, sink), task in zip(nodes, joining, strict=True)
-            ]
+            sending = [group.create_task(send_all(entrant, timeline, end_s, stop)) for entrant in entrants]
             await asyncio.wait(sending)
             beside.cancel()
     except ExceptionGroup as errors:
         raise errors.exceptions[0] from None
     finally:
-        for task, (_, sink) in zip(joining, nodes, strict=True):
-            task.cancel()
-            await sink.leave(0)  # nothing for those that left with their count
+        for entrant in entrants:
+            entrant.joining.cancel()
+            await entrant.sink.leave(0)  # nothing for those that left with their count
     return {(s.subject, s.segment): t.result() for (s, _), t in zip(nodes, sending, strict=True)}
 
 
