@@ -5,7 +5,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from brachium_viewer.health import Network, NetworkHealth
+from brachium_viewer.health import Network
+from brachium_viewer.health_records import NetworkHealth
 from brachium_viewer.monitor import block, to_json
 from brachium_wire import keys
 from brachium_wire.codec import encode

@@ -116,3 +116,28 @@ def test_a_low_battery_is_named(hours: float | None, warned: bool) -> None:
     assert ("LOW BATTERY: p01/hand_r" in said) is warned
     if hours == 1 / 3:
         assert "20 min left\n" in said
+
+
+@pytest.mark.parametrize(
+    ("told", "shown"),
+    [
+        ({"battery_level": 0.5, "battery_hours": 5.26, "battery_v": 3.75}, "50 % 5.3 h"),
+        ({"battery_level": 0.5, "battery_v": 3.75}, "50 %"),
+        ({"battery_hours": 5.26, "battery_v": 3.75}, "5.3 h"),
+        ({"battery_v": 3.75}, "3.75 V"),
+        ({}, "-"),
+    ],
+)
+def test_the_charge_and_the_hours_left_stand_in_the_table(told: dict[str, float], shown: str) -> None:
+    network = Network()
+    status = Status(node="n7", time_ns=1, connected=True, received=9, lost=0, out_of_order=0, **told)
+    network.feed(keys.status(ROOM, "p01", "hand_r"), encode(status), 1)
+    head, row = monitor.block(network.report(2)).splitlines()[2:4]
+    end = head.index("bat") + len("bat")  # figures stand to the right
+    assert row[:end].endswith(f" {shown}")
+    (node,) = json.loads(monitor.to_json(network.report(2)))["nodes"]
+    assert {name: node[name] for name in ("battery_level", "battery_hours", "battery_v")} == {
+        "battery_level": None,
+        "battery_hours": None,
+        "battery_v": None,
+    } | told

@@ -1,10 +1,11 @@
 """How the network fares: arrivals and their times in; live nodes, rates, loss and latency out."""
 
-from dataclasses import dataclass, field
+from typing import Any
 
 from brachium_viewer.contents import outwards
+from brachium_viewer.health_records import ArmHealth, NetworkHealth, NodeHealth, ServiceHealth
 from brachium_viewer.statistics import percentiles
-from brachium_viewer.window import SECOND, WINDOW_NS, State, Window, limit_s, state
+from brachium_viewer.window import SECOND, WINDOW_NS, Window, limit_s, state
 from brachium_wire import keys
 from brachium_wire.codec import WireError, decode_topic
 from brachium_wire.messages import Health, Info, SampleBatch, Skeleton, Status
@@ -13,88 +14,6 @@ from brachium_wire.topics import TOPICS
 
 _NO_SERVICES = ("node", "host")
 """Tokens of sensors, which are shown as nodes, and of the claim on a subject's host time."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class NodeHealth:
-    """One sensor as seen from here. A figure that nobody told is None."""
-
-    subject: str
-    segment: str
-    state: State
-    node: str = ""
-    origin: str = ""
-    rate_hz: float
-    """Samples a second that arrive here."""
-    nominal_hz: float | None = None
-    age_s: float | None = None
-    received: int = 0
-    lost: int = 0
-    """By the gateway's count since the node joined; by our own where no gateway reports."""
-    out_of_order: int = 0
-    late: int = 0
-    battery_v: float | None = None
-    battery_hours: float | None = None
-    rssi_dbm: float | None = None
-    clock_uncertainty_ms: float | None = None
-    drops: dict[str, int] = field(default_factory=dict)
-
-    @property
-    def loss(self) -> float:
-        """Return the lost samples over those sent, 0 to 1."""
-        sent = self.received + self.lost
-        return self.lost / sent if sent else 0.0
-
-
-@dataclass(frozen=True, kw_only=True)
-class ArmHealth:
-    """One arm's skeletons."""
-
-    subject: str
-    side: str
-    state: State
-    origin: str = ""
-    rate_hz: float
-    nominal_hz: float
-    age_s: float
-    latency_p50_ms: float | None = None
-    """From the gateway's having the last sample to the skeleton's arrival here; same host only."""
-    latency_p99_ms: float | None = None
-    forward: str = ""
-    quality: dict[str, str] = field(default_factory=dict)
-    """By segment."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class ServiceHealth:
-    """One service: up while its token is there and its beat comes."""
-
-    kind: str
-    id: str
-    up: bool
-    age_s: float | None = None
-    drops: dict[str, int] = field(default_factory=dict)
-    text: str = ""
-    alarm: str = ""
-
-
-@dataclass(frozen=True, kw_only=True)
-class NetworkHealth:
-    """Everything that the monitor shows, at one moment."""
-
-    live: int
-    nodes: list[NodeHealth]
-    arms: list[ArmHealth]
-    services: list[ServiceHealth]
-    waiting: list[str]
-    """Nodes that asked to join and are not assigned."""
-    drops: dict[str, int]
-    """What this program itself could not read, by reason."""
-
-    @property
-    def headline(self) -> str:
-        """Return the line that stands first everywhere."""
-        return f"{self.live} of {len(self.nodes)} nodes live"
 
 
 class Network:
@@ -161,6 +80,11 @@ class Network:
         )
 
 
+_COUNTS = ("received", "lost", "out_of_order", "late")
+_FIGURES = ("battery_v", "battery_level", "battery_hours", "rssi_dbm")
+"""What a gateway's status says of a node, as it stands there."""
+
+
 class _Node:
     def __init__(self) -> None:
         self.info: Info | None = None
@@ -179,6 +103,11 @@ class _Node:
         found = state(age_s, limit_s("imu"), limit_s("status"))
         if status is not None and not status.connected:
             found = "missing"
+        told: dict[str, Any] = (
+            {"received": own.received, "lost": own.lost, "out_of_order": own.out_of_order, "late": self.late}
+            if status is None
+            else {name: getattr(status, name) for name in (*_COUNTS, *_FIGURES)}
+        )
         uncertainty = status.clock_uncertainty_ns if status is not None else None
         return NodeHealth(
             subject=subject,
@@ -189,15 +118,9 @@ class _Node:
             rate_hz=self.window.rate_hz(now_ns),
             nominal_hz=info.rate_hz if info is not None else None,
             age_s=age_s,
-            received=status.received if status is not None else own.received,
-            lost=status.lost if status is not None else own.lost,
-            out_of_order=status.out_of_order if status is not None else own.out_of_order,
-            late=status.late if status is not None else self.late,
-            battery_v=status.battery_v if status is not None else None,
-            battery_hours=status.battery_hours if status is not None else None,
-            rssi_dbm=status.rssi_dbm if status is not None else None,
             clock_uncertainty_ms=None if uncertainty is None else uncertainty / 1e6,
             drops=dict(status.drops) if status is not None else {},
+            **told,
         )
 
 

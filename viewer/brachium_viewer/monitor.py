@@ -7,7 +7,8 @@ import time
 from dataclasses import asdict, dataclass
 from typing import TextIO
 
-from brachium_viewer.health import ArmHealth, Network, NetworkHealth, NodeHealth
+from brachium_viewer.health import Network
+from brachium_viewer.health_records import ArmHealth, NetworkHealth, NodeHealth
 from brachium_wire import keys
 from brachium_wire.battery import is_low
 from brachium_wire.bus import DEFAULT_ENDPOINT, Bus
@@ -165,9 +166,6 @@ def _number(value: float | None, digits: int = 1) -> str:
 
 
 def _node(node: NodeHealth) -> tuple[str, ...]:
-    battery = "-" if node.battery_v is None else f"{node.battery_v:.2f} V"
-    if node.battery_hours is not None:
-        battery = f"{node.battery_hours:.1f} h"
     nominal = "" if node.nominal_hz is None else f"/{node.nominal_hz:g}"
     return (
         f"{node.subject}/{node.segment}",
@@ -179,10 +177,20 @@ def _node(node: NodeHealth) -> tuple[str, ...]:
         str(node.out_of_order),
         str(node.late),
         _number(node.age_s, 2),
-        battery,
+        _battery(node),
         _number(node.rssi_dbm, 0),
         _number(node.clock_uncertainty_ms, 2),
     )
+
+
+def _battery(node: NodeHealth) -> str:
+    """Return the charge and the hours left as far as they are known, else the voltage."""
+    said = [] if node.battery_level is None else [f"{100.0 * node.battery_level:.0f} %"]
+    if node.battery_hours is not None:
+        said.append(f"{node.battery_hours:.1f} h")
+    elif node.battery_v is not None and not said:
+        said.append(f"{node.battery_v:.2f} V")
+    return " ".join(said) or "-"
 
 
 def _arm(arm: ArmHealth) -> tuple[str, ...]:

@@ -11,7 +11,7 @@ import numpy as np
 from brachium_body.ranges import FUNCTIONAL, REFERENCE, Range
 from brachium_body.segments import part_of
 from brachium_viewer.exercises import EXERCISES, Exercise
-from brachium_viewer.health import NodeHealth
+from brachium_viewer.health_records import NodeHealth
 from brachium_viewer.marks import ExerciseBegins
 from brachium_viewer.scene import lean
 from brachium_viewer.web.running_set import Progress
