@@ -21,12 +21,13 @@ from brachium_wire.codec import encode
 
 REFUSALS = 3
 SHORTEST_S, LONGEST_S = 0.2, 45.0
-PAIRS, NAGLED_S = 20, 0.025
+PAIRS, ENOUGH, NAGLED_S = 20, 10, 0.025
 """A small message that waits for an acknowledgement waits 40 ms on Linux, longer elsewhere."""
 RETRY_S = 2.0
 CALIBRATION = '{"gyro_bias": [0.0125, -0.0175, 0.0025]}'
 UNKNOWN = b"\x82\xa1m\xa8spoon/99\xa1x\x01"
 PONG_WITHIN_S = 2.0
+LOOK_S = 0.5
 
 
 @dataclass(kw_only=True)
@@ -86,10 +87,10 @@ def door(play: Play) -> bool:
         return False
     play.verdicts.append(judged("request", first.request_fault(), "GET /node"))
     play.verdicts.append(judged("token", _token_fault(first, play.trial.token), "in the header alone"))
-    times = [time.monotonic()]
+    times, ran = [time.monotonic()], not play.trial.ended()
     first.refuse()
     for _ in range(REFUSALS):
-        caller = play.stage.accept(play.trial.patience.return_s)
+        caller = _calls_again(play, ran)
         if caller is None:
             break
         times.append(time.monotonic())
@@ -105,6 +106,17 @@ def door(play: Play) -> bool:
         fine = min(waits) >= SHORTEST_S and max(waits) <= LONGEST_S and waits[-1] > waits[0]
         play.verdicts.append(judged("back-off", "" if fine else text, text))
     return True
+
+
+def _calls_again(play: Play, ran: bool) -> Caller | None:
+    """Return its next call. A command that ran until it was refused (`ran`) and has ended calls no more."""
+    end_s = time.monotonic() + play.trial.patience.return_s
+    while (left_s := end_s - time.monotonic()) > 0.0:
+        over = ran and play.trial.ended()
+        caller = play.stage.accept(min(left_s, LOOK_S))
+        if caller is not None or over:
+            return caller
+    return None
 
 
 def _token_fault(caller: Caller, token: str) -> str:
@@ -135,8 +147,10 @@ def quiet(play: Play, caller: Caller) -> Caller | None:
 
 def _no_delay(caller: Caller) -> Verdict:
     """Ask twice in a row, again and again: the second answer must not wait for the first one's receipt."""
-    apart = []
-    for _ in range(PAIRS):
+    apart: list[float] = []
+    for asked in range(PAIRS):
+        if asked - len(apart) > PAIRS - ENOUGH:
+            break
         caller.acknowledge_late()
         due = len(caller.heard.exchanges) + 2
         caller.ask(2)
@@ -145,7 +159,7 @@ def _no_delay(caller: Caller) -> Verdict:
         if len(last) == 2:
             apart.append((last[1].answered_ns - last[0].answered_ns) * 1e-9)
         caller.attend(0.05, ask=False)
-    if len(apart) < PAIRS // 2:
+    if len(apart) < ENOUGH:
         return not_claimed("no delay", "it answers no clock question")
     text = f"second of two answers {1e3 * median(apart):.1f} ms after the first, at the median"
     return judged("no delay", text if median(apart) > NAGLED_S else "", text)
