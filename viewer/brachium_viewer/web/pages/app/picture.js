@@ -22,10 +22,6 @@ export class Picture {
     this.renderer = new THREE.WebGLRenderer({ antialias: true, alpha: true });
     this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
     box.append(this.renderer.domElement);
-    this.light = new THREE.HemisphereLight(0xffffff, 0x8b98a3, 2.1);
-    const sun = new THREE.DirectionalLight(0xffffff, 1.9);
-    sun.position.set(1.5, 2.5, 3);
-    this.scene.add(this.light, sun);
     this.floor = this.ground();
     this.figure = new Figure(this.scene);
     box.drawn = () => this.figure.drawn();

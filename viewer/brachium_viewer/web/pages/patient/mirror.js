@@ -24,9 +24,6 @@ export class Mirror {
     this.scene.scale.x = -1; // the mirror
     this.camera = new THREE.PerspectiveCamera(ANGLE, 1, 0.1, 20);
     this.camera.up.set(0, 0, 1);
-    const sun = new THREE.DirectionalLight(0xffffff, 1.9);
-    sun.position.set(-1.5, 2.5, 3);
-    this.scene.add(new THREE.HemisphereLight(0xffffff, 0x8b98a3, 2.1), sun);
     this.figure = new Figure(this.scene);
     place.drawn = () => this.figure.drawn();
     new ResizeObserver(() => this.fit()).observe(place);
