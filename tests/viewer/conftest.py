@@ -1,9 +1,12 @@
 """A moving arm as skeletons, a router to send them through, and the view that shows them."""
 
+import errno
+import os
 import socket
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,6 +16,7 @@ from brachium_router.config import RouterSettings, endpoint
 from brachium_router.service import run as run_router
 from brachium_viewer.live import ViewSettings
 from brachium_viewer.live import run as run_view
+from brachium_wire import growing_file
 from brachium_wire.messages import SegmentPose, Skeleton
 
 LENGTHS = (0.31, 0.26, 0.18)
@@ -132,3 +136,30 @@ def _view(endpoint: str, **settings: object) -> Iterator[Running]:
 def open_view() -> Callable[..., AbstractContextManager[Running]]:
     """The view of a router's room as a context manager; it must end within 2 s."""
     return _view
+
+
+@pytest.fixture
+def disk(monkeypatch: pytest.MonkeyPatch) -> SimpleNamespace:
+    """A disk that takes `room` bytes of every recording, and `reserve` more once a reserve was given back."""
+    one = SimpleNamespace(room=1 << 30, reserve=0)
+    push, release = growing_file.GrowingFile.push, growing_file.GrowingFile.release
+    reserve = growing_file.GrowingFile.reserve
+
+    def kept(file: growing_file.GrowingFile, size: int) -> None:
+        if not one.room:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        reserve(file, size)
+
+    def bounded(file: growing_file.GrowingFile) -> None:
+        if file.tell() > one.room:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        push(file)
+
+    def given_back(file: growing_file.GrowingFile) -> None:
+        one.room += one.reserve
+        release(file)
+
+    monkeypatch.setattr(growing_file.GrowingFile, "reserve", kept)
+    monkeypatch.setattr(growing_file.GrowingFile, "push", bounded)
+    monkeypatch.setattr(growing_file.GrowingFile, "release", given_back)
+    return one

@@ -5,6 +5,7 @@ import json
 import socket
 import threading
 from collections.abc import Iterator
+from typing import Any
 
 import pytest
 
@@ -128,7 +129,7 @@ def test_a_low_battery_is_named(hours: float | None, warned: bool) -> None:
         ({}, "-"),
     ],
 )
-def test_the_charge_and_the_hours_left_stand_in_the_table(told: dict[str, float], shown: str) -> None:
+def test_the_charge_and_the_hours_left_stand_in_the_table(told: dict[str, Any], shown: str) -> None:
     network = Network()
     status = Status(node="n7", time_ns=1, connected=True, received=9, lost=0, out_of_order=0, **told)
     network.feed(keys.status(ROOM, "p01", "hand_r"), encode(status), 1)

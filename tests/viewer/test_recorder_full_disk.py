@@ -1,8 +1,7 @@
 """A recorder whose disk is full: the file is whole, somebody is told, and everything else goes on."""
 
-import errno
-import os
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -10,7 +9,7 @@ from brachium_viewer import recorder
 from brachium_viewer.health import Network
 from brachium_viewer.monitor import block, to_json
 from brachium_viewer.web.page_state import PageState
-from brachium_wire import growing_file, keys, recording
+from brachium_wire import keys, recording
 from brachium_wire.codec import encode
 from brachium_wire.messages import Event, Health
 
@@ -22,37 +21,13 @@ def event(number: int) -> bytes:
     return encode(Event(time_ns=number, kind="mark"))
 
 
-class Disk:
-    """Takes `room` bytes of every file together, and more once a reserve was given back."""
-
-    def __init__(self, monkeypatch: pytest.MonkeyPatch, room: int) -> None:
-        self.room, self.reserve = room, 0
-        push, release = growing_file.GrowingFile.push, growing_file.GrowingFile.release
-
-        def bounded(file: growing_file.GrowingFile) -> None:
-            size = file.tell()
-            if size > self.room:
-                raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-            push(file)
-
-        def given_back(file: growing_file.GrowingFile) -> None:
-            self.room += self.reserve
-            release(file)
-
-        monkeypatch.setattr(growing_file.GrowingFile, "push", bounded)
-        monkeypatch.setattr(growing_file.GrowingFile, "release", given_back)
-
-
 def fill(one: recorder.Recorder, count: int) -> None:
     for i in range(count):
         one.take(KEY, event(i), 1 + i * 50_000_000)
 
 
-def test_it_ends_the_file_with_all_that_came_until_then(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    disk = Disk(monkeypatch, room=20_000)
-    disk.reserve = 1 << 20
+def test_it_ends_the_file_with_all_that_came_until_then(tmp_path: Path, disk: SimpleNamespace) -> None:
+    disk.room, disk.reserve = 20_000, 1 << 20
     with recording.RecordingWriter(tmp_path / "a.mcap") as writer:
         one = recorder.Recorder(writer)
         fill(one, 2000)
@@ -69,10 +44,8 @@ def test_it_ends_the_file_with_all_that_came_until_then(
     one.tick(1 << 60)  # nothing more happens to the file
 
 
-def test_a_disk_that_is_full_for_good_leaves_what_it_took(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    Disk(monkeypatch, room=20_000)
+def test_a_disk_that_is_full_for_good_leaves_what_it_took(tmp_path: Path, disk: SimpleNamespace) -> None:
+    disk.room = 20_000
     with recording.RecordingWriter(tmp_path / "a.mcap") as writer:
         one = recorder.Recorder(writer)
         fill(one, 2000)
@@ -101,13 +74,9 @@ def test_monitor_and_page_show_the_alarm_in_words_while_the_recorder_is_there() 
 
 
 def test_a_folder_without_room_to_begin_is_said_and_holds_nothing(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, disk: SimpleNamespace
 ) -> None:
-    def full(file: growing_file.GrowingFile, size: int) -> None:
-        del file, size
-        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-
-    monkeypatch.setattr(growing_file.GrowingFile, "reserve", full)
+    disk.room = 0
     with pytest.raises(OSError, match="No space left"):
         recorder._create(recorder.RecordSettings(folder=tmp_path, room=ROOM))
     assert list(tmp_path.iterdir()) == []

@@ -9,6 +9,7 @@ import logging
 import threading
 import time
 from collections import Counter
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
@@ -59,9 +60,15 @@ class RecordReport:
 class Recorder:
     """Sorts what arrives into what is recorded and what is dropped, and counts both."""
 
-    def __init__(self, writer: recording.RecordingWriter, subject: str | None = None) -> None:
+    def __init__(
+        self,
+        writer: recording.RecordingWriter,
+        subject: str | None = None,
+        on_end: Callable[[str], None] = log.error,
+    ) -> None:
+        """`on_end` is told once why the disk takes no more."""
         self.writer = writer
-        self._subject = subject
+        self._subject, self._on_end = subject, on_end
         self.received: Counter[str] = Counter()
         self.drops: Counter[str] = Counter()
         self.ended = ""
@@ -111,7 +118,7 @@ class Recorder:
             f"the disk takes no more ({error.strerror}); {path.name} holds {kept}. "
             f"Make room in {path.parent}, then record anew"
         )
-        log.error("%s", self.ended)
+        self._on_end(self.ended)
 
     def report(self) -> RecordReport:
         """Compare what was received with what the closed file holds."""
@@ -129,10 +136,13 @@ class Recorder:
         )
 
 
-def run(settings: RecordSettings, stop: threading.Event) -> RecordReport:
+def run(
+    settings: RecordSettings, stop: threading.Event, on_end: Callable[[str], None] = log.error
+) -> RecordReport:
     """Record the room until `stop` is set or the time is over, and say what the file holds.
 
-    Raises BadKey before anything is touched, NoRouter, and OSError when the disk has no room to begin.
+    `on_end` is told at once when the disk takes no more. Raises BadKey before anything is touched, NoRouter,
+    and OSError when the disk has no room to begin.
     """
     keys.service(settings.room, "recorder", settings.id)
     if settings.subject is not None:
@@ -145,7 +155,7 @@ def run(settings: RecordSettings, stop: threading.Event) -> RecordReport:
         inbox = bus.subscribe(keys.everything(settings.room), CAPACITY)
         heart = Heart(bus, settings.room, "recorder", settings.id)
         with _create(settings) as writer:
-            recorder = Recorder(writer, settings.subject)
+            recorder = Recorder(writer, settings.subject, on_end)
             heart.text = writer.path.name
             for key, payload in opening(bus, settings.room, settings.subject):
                 recorder.take(key, payload, clock.now_ns())

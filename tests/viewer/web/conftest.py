@@ -10,6 +10,10 @@ import aiohttp
 import pytest
 
 from brachium_viewer.web import server
+from brachium_wire import keys
+from brachium_wire.bus import Bus
+from brachium_wire.codec import encode
+from brachium_wire.messages import Info
 
 START_S = 40.0
 
@@ -101,3 +105,24 @@ def watch() -> Callable[..., None]:
         asyncio.run(screen())
 
     return run
+
+
+@pytest.fixture
+def moving_arm(router_endpoint: str, arm_at):
+    """A router beside which an emulated right arm is published at 50 Hz; its endpoint."""
+    stop = threading.Event()
+
+    def publish() -> None:
+        with Bus.open(router_endpoint) as bus:
+            info = Info(node="n", rate_hz=100.0, origin="emulated", host="h")
+            bus.retain(keys.info("lab", "p01", "forearm_r"), encode(info))
+            number = 0
+            while not stop.wait(0.02):
+                number += 1
+                bus.put(keys.skeleton("lab", "p01", "right"), encode(arm_at(0.02 * number)))
+
+    thread = threading.Thread(target=publish)
+    thread.start()
+    yield router_endpoint
+    stop.set()
+    thread.join(5.0)

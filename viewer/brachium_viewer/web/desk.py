@@ -2,12 +2,13 @@
 
 import asyncio
 import logging
+from contextlib import suppress
 from typing import Any
 
 from brachium_viewer import marks
 from brachium_viewer.web import requests as r
 from brachium_viewer.web.page_state import PageState
-from brachium_viewer.web.session_desk import SessionDesk
+from brachium_viewer.web.session_desk import NoRecording, SessionDesk
 from brachium_wire import keys
 from brachium_wire.bus import Bus
 from brachium_wire.codec import WireError, decode, encode
@@ -72,7 +73,8 @@ class Desk:
             case r.PatientStop():
                 ended = await self._end(subject, "patient-stop", none_is_fine=True)
                 self._state.stopped = asked.reason  # every screen is told, whatever becomes of the recording
-                await self._mark(subject, marks.PatientStop(reason=asked.reason))
+                with suppress(NoRecording):  # it shows an alarm of its own
+                    await self._mark(subject, marks.PatientStop(reason=asked.reason))
                 return ended
             case r.Report():
                 return await self._finish(subject)
@@ -135,7 +137,7 @@ class Desk:
             sets=asked.sets,
             repetitions=asked.repetitions,
         )
-        await self._sessions.begin(self._bus, subject)
+        await self._sessions.begin(self._bus, subject, anew=True)
         now_ns = self._instant_ns()
         self._state.begin(begins, now_ns)
         self._put(subject, begins, now_ns)

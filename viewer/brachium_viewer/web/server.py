@@ -186,7 +186,8 @@ class _Server:
 
     def _state_now(self, now_ns: int) -> str:
         state, session = self._state.state(now_ns), self._sessions.state(self._state.subject)
-        return _text({**state, **session, "alarms": state["alarms"] + session["alarms"]})
+        alarms = {alarm["reason"]: alarm for alarm in state["alarms"] + session["alarms"]}
+        return _text({**state, **session, "alarms": list(alarms.values())})
 
     def _greet(self) -> Seat:
         seat = Seat()

@@ -46,11 +46,20 @@ class SessionDesk:
         self.subject: str | None = None
         """Whose session is recorded."""
         self.failure = ""
-        """Why recording did not begin or stopped; empty while it goes on."""
+        """Why recording did not begin or stopped; until another one has begun."""
 
-    async def begin(self, bus: Bus, subject: str) -> None:
-        """Record from now on, if not yet. Raises NoRecording."""
+    async def begin(self, bus: Bus, subject: str, *, anew: bool = False) -> None:
+        """Record from now on, if not yet. Raises NoRecording.
+
+        Where a recording stopped by itself, only `anew` begins the next one: whoever asks has seen the alarm.
+        """
         async with self._beginning:
+            if self._thread is not None and self.failure:
+                if not anew:
+                    raise NoRecording(self.failure)
+                await asyncio.to_thread(self.close)
+                if self._closed is not None:
+                    self._later(self._keep_aside(self._closed.path, subject))
             if self._thread is None:
                 await asyncio.to_thread(self._start, bus, subject)
 
@@ -99,7 +108,8 @@ class SessionDesk:
         return {"state": "on", "seconds": round(time.monotonic() - self._begun_s)}
 
     def _start(self, bus: Bus, subject: str) -> None:
-        self._stop, self.failure, self._closed = threading.Event(), "", None
+        before, self.failure = self.failure, ""
+        self._stop, self._closed = threading.Event(), None
         thread = threading.Thread(target=self._run, args=(subject, self._stop), name="recorder")
         thread.start()
         token = keys.services(self._settings.room, f"recorder/{self._settings.id}/alive")
@@ -107,16 +117,31 @@ class SessionDesk:
         while not bus.alive(token):  # until then, what is put is not recorded
             if not thread.is_alive() or time.monotonic() > deadline:
                 self._stop.set()
-                raise NoRecording(self.failure or f"the recorder did not start within {READY_S:.0f} s")
+                why = self.failure or f"the recorder did not start within {READY_S:.0f} s"
+                self.failure = self.failure or before
+                raise NoRecording(why)
             time.sleep(LOOK_S)
         self._thread, self._begun_s, self.subject = thread, time.monotonic(), subject
 
     def _run(self, subject: str, stop: threading.Event) -> None:
         try:
-            self._closed = recorder.run(replace(self._settings, subject=subject), stop)
+            self._closed = recorder.run(replace(self._settings, subject=subject), stop, self._ended)
         except Exception as error:
             log.exception("the recording of %s stopped", subject)
             self.failure = " ".join(str(error).split())[:300] or type(error).__name__
+
+    def _ended(self, why: str) -> None:
+        """Runs on the recorder's thread, which goes on counting what it lets go."""
+        log.error("%s", why)
+        self.failure = why
+
+    async def _keep_aside(self, path: Path, subject: str) -> None:
+        """Keep the session of a recording that stopped by itself while the next one runs."""
+        try:
+            await asyncio.to_thread(keeping.apart, keeping.keep, path, subject)
+        except Exception as error:
+            log.warning("%s is not among the sessions: %s; add it with brachium sessions", path, error)
+        self._history = None, []
 
     async def _look(self, subject: str) -> None:
         try:
