@@ -84,6 +84,7 @@ class _Service:
 
         self._sender: ArmSender | None = None
         self._send_s = self._beat_s = 0.0
+        self._looked_ns = self._clock.now_ns()
         if table is not None:
             self._sender = ArmSender(
                 bus, settings.room, table, settings.origins, fd=settings.port.fd, echoes=port.echoes
@@ -123,8 +124,11 @@ class _Service:
             now_s = min(time.monotonic(), due_s)
 
     def _look(self) -> None:
+        # What came before the last look has been read by now. After a hold-up of this thread the rest of a
+        # sample may still lie in the interface: it is not late.
+        read_ns, self._looked_ns = self._looked_ns, self._clock.now_ns()
         if self._imus is not None:
-            self._imus.tick(self._clock.now_ns())
+            self._imus.tick(read_ns)
         if time.monotonic() >= self._beat_s:
             self._beat()
 
