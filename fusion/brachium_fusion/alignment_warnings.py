@@ -3,7 +3,8 @@
 from collections.abc import Collection, Mapping, Sequence
 from itertools import pairwise
 
-from brachium_body.segments import SIDES, arm_segments, part_of, side_of
+from brachium_body.segments import SIDES, arm_segments, part_of
+from brachium_fusion.wear_words import place
 from brachium_wire.messages import Forward
 
 BETWEEN: dict[tuple[str, str], str] = {
@@ -12,6 +13,8 @@ BETWEEN: dict[tuple[str, str], str] = {
     ("forearm", "hand"): "wrist angles",
 }
 """What rests on the heading between two neighbours; with a segment left out, only directions do."""
+TO_DO = "give the nominal mounting"
+ELBOW_TO_DO = "give the nominal mounting or bend the elbow while it is calibrated"
 MISPLACED_DEG = 45.0
 """A sensor that sits further from its nominal mounting is on another place, or the wrong way round."""
 
@@ -32,11 +35,11 @@ def warnings_for(
     warnings += _loose(segments, assumed, tied)
     for name, value in scores.items():
         if name.startswith("from_nominal_deg_") and value > MISPLACED_DEG:
-            segment = name.removeprefix("from_nominal_deg_")
-            place = f"{side_of(segment) or ''} {part_of(segment).replace('_', ' ')}".strip()
+            on = place(name.removeprefix("from_nominal_deg_"))
             warnings.append(
-                f"{segment} sits {value:.0f} deg from its nominal mounting: "
-                f"check that the sensor is on the {place}, the right way round"
+                f"the sensor on the {on} is turned by {value:.0f} deg against the way it should be worn, or "
+                f"the arm was not in the pose: look that it sits on the {on}, the right way round, take the "
+                "pose exactly, and calibrate again"
             )
     return tuple(warnings)
 
@@ -45,9 +48,10 @@ def _forward(segments: Collection[str], assumed: Collection[str]) -> str:
     turned = "planes of movement and shoulder rotation are relative to it"
     if not any(part_of(s) == "upper_arm" for s in segments):
         turned = "where it points seen from the trunk is relative to it"
-    named = f"the heading of {_listed(assumed)} against the trunk is assumed, and " if assumed else ""
+    if assumed:
+        turned = f"the heading of {_listed(assumed)} against the trunk is assumed, and {turned}"
     return (
-        f"no rule says where forward is: {named}{turned}; inclinations hold; "
+        f"no rule says where forward is: {turned}; inclinations hold; "
         "give facing_deg (with magnetometers), or the nominal mounting of a sternum or upper-arm sensor"
     )
 
@@ -68,8 +72,7 @@ def _loose(segments: Collection[str], assumed: Collection[str], tied: Sequence[C
     return [
         f"heading of {_listed(doubtfuls)} is assumed against {_listed(others)}: neither magnetometers nor a "
         f"nominal mounting nor movement ties them, so {between} can be far off and even have the wrong sign; "
-        "give the nominal mounting"
-        + (" or bend the elbow while it is calibrated" if between.startswith("elbow") else "")
+        f"{ELBOW_TO_DO if between.startswith('elbow') else TO_DO}"
         for between, (doubtfuls, others) in found.items()
     ]
 

@@ -86,10 +86,8 @@ def _span_reason(part: JointMotion, found: JointAxes, frames: ElbowFrames, kind:
     about = np.einsum("ni,ni->n", joint, axis)
     share = float(about @ about) / max(1e-9, float(np.einsum("ni,ni->", joint, joint)))
     if share < SHARE:
-        return (
-            f"movement about another axis: {100.0 * share:.0f} % of the turning is {kind.replace('-', ' ')}; "
-            "do that movement alone"
-        )
+        asked = "bending of the elbow" if kind == "elbow-flexion" else "turning of the forearm"
+        return f"movement about another axis: {100.0 * share:.0f} % of it is {asked}; do that movement alone"
     along = float(np.linalg.norm(part.rate_a)) / max(1e-9, float(np.linalg.norm(part.rate_b)))
     if along > ALONG and degrees(found.axis_a_sd) > ALONG_SD_DEG:
         return (

@@ -17,11 +17,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from brachium_body.segments import part_of, side_of
 from brachium_fusion.joint_model import Joint
 from brachium_fusion.slip_joints import JointTurned, JointTurns
 from brachium_fusion.slip_postures import NEAR, evidence_of, turned_since
 from brachium_fusion.timeline import SensorNow
+from brachium_fusion.wear_words import place
 
 Floats = npt.NDArray[np.float64]
 
@@ -206,7 +206,6 @@ class SlipWatch:
     ) -> Slip:
         """Return the finding, and compare with nothing before it from now on."""
         segment, size = self.segments[sensor], float(np.degrees(np.linalg.norm(turn)))
-        place = f"{side_of(segment) or ''} {part_of(segment).replace('_', ' ')}".strip()
         self._rests = [r for r in self._rests if r.from_ns >= time_ns]
         for turns in self._joints.values():
             turns.forget(time_ns)
@@ -219,7 +218,7 @@ class SlipWatch:
             size_deg=size,
             turn=(x, y, z),
             evidence=evidence,
-            text=f"the sensor on the {place} has turned by about {size:.0f} deg or more, "
+            text=f"the sensor on the {place(segment)} has turned by about {size:.0f} deg or more, "
             f"{(now_ns - time_ns) / 1e9:.0f} s ago: tighten its strap and take the pose again",
         )
 

@@ -2,7 +2,7 @@
 
 from typing import Literal
 
-from brachium_body.segments import Segment, part_of, side_of
+from brachium_body.segments import part_of, side_of
 
 Turn = Literal["", "upside-down", "inside-out", "both"]
 
@@ -19,6 +19,6 @@ TURN_WORDS: dict[Turn, str] = {
 }
 
 
-def place(segment: Segment) -> str:
+def place(segment: str) -> str:
     """Return where a segment is, as in `right upper arm`."""
     return f"{side_of(segment) or ''} {part_of(segment).replace('_', ' ')}".strip()
