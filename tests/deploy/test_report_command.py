@@ -36,7 +36,7 @@ def test_an_emulated_session_is_a_recording_like_any(recording: Path) -> None:
         assert sensor.status.lost <= sensor.counted.lost
     skeletons = found.arms["p01", "right"].published
     assert len(skeletons) > 0.98 * 1.4 * 60 * 50
-    assert {s.origin for s in skeletons} == {"emulated"}
+    assert {s.origin for s in skeletons.examples} == {"emulated"}
 
 
 def test_report_writes_its_page_and_its_table(

@@ -12,6 +12,7 @@ from brachium_wire import keys, recording
 from brachium_wire.codec import encode
 from brachium_wire.messages import Calibration, Info, Quality, SegmentPose, Session, Skeleton, Status
 from brachium_wire.samples import write_samples
+from brachium_wire.skeleton_columns import SkeletonCollector
 
 ROOM, SECOND, T0 = "gym", 1_000_000_000, 1_700_000_000_000_000_000
 TICK = SECOND // 50
@@ -204,8 +205,8 @@ def test_held_and_missing_segments_say_nothing_of_calibration() -> None:
         ({"hand_r": "held", "forearm_r": "missing"}, True),
         ({"hand_r": "good", "forearm_r": "uncalibrated"}, False),
     ]
-    skeletons = [
-        skeleton(T0, {}, 0.0, segments={name: SegmentPose(quality=q) for name, q in one.items()})
-        for one, _ in qualities
-    ]
-    assert contents.calibrated(skeletons).tolist() == [expected for _, expected in qualities]
+    collector = SkeletonCollector()
+    for one, _ in qualities:
+        segments = {name: SegmentPose(quality=q) for name, q in one.items()}
+        collector.take(encode(skeleton(T0, {}, 0.0, segments=segments)), T0)
+    assert contents.calibrated(collector.columns()).tolist() == [expected for _, expected in qualities]

@@ -1,8 +1,6 @@
 """What a recording holds, sorted out into arrays: the way in of figures, pages and exports."""
 
-import gc
-from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -25,9 +23,7 @@ from brachium_wire.messages import (
 )
 from brachium_wire.recording import Recorded
 from brachium_wire.sequence import SequenceCounter
-
-Floats = npt.NDArray[np.float64]
-Times = npt.NDArray[np.int64]
+from brachium_wire.skeleton_columns import SkeletonCollector, SkeletonColumns
 
 Who = tuple[str, str]
 """A subject and a segment or side."""
@@ -44,14 +40,12 @@ class SensorContents:
     """Counted from the batches in the recording."""
 
 
-@dataclass(slots=True)
+@dataclass(frozen=True, slots=True)
 class ArmContents:
-    """One arm's skeletons, published and true, in the order in which they came."""
+    """One arm's skeletons, published and true, in the order in which they came; there is at least one."""
 
-    published: list[Skeleton] = field(default_factory=list)
-    arrived_ns: list[int] = field(default_factory=list)
-    """When each published one was recorded."""
-    true: list[Skeleton] = field(default_factory=list)
+    published: SkeletonColumns
+    true: SkeletonColumns
 
 
 @dataclass(slots=True)
@@ -82,51 +76,53 @@ class Contents:
     def origins(self) -> list[str]:
         """Return where the data come from, by every sensor and skeleton: worn, emulated, playback."""
         found = {s.info.origin for s in self.sensors.values() if s.info is not None}
-        found |= {arm.published[-1].origin for arm in self.arms.values() if arm.published}
+        found |= {arm.published.last.origin for arm in self.arms.values() if len(arm.published)}
         return sorted(found)
 
 
 def load(path: Path) -> Contents:
     """Return what a recording holds; raises recording.RecordingError for a file that is none."""
-    with recording.read(path) as reading, _uncollected():
+    with recording.read(path) as reading:
         contents = sort_out(reading)
     contents.metadata, contents.warning = reading.metadata, reading.warning
     return contents
 
 
-@contextmanager
-def _uncollected() -> Iterator[None]:
-    """Keep the collector of cycles off: a hundred thousand records hold none, and it would look at each of
-    them again and again."""
-    on = gc.isenabled()
-    gc.disable()
-    try:
-        yield
-    finally:
-        if on:
-            gc.enable()
-
-
 def sort_out(messages: Iterable[Recorded]) -> Contents:
     """Sort messages in order of arrival; what cannot be read is counted and left out."""
     contents = Contents()
-    for key, payload, log_time_ns in messages:
+    arms: dict[Who, dict[str, SkeletonCollector]] = {}
+    for name, payload, log_time_ns in messages:
         contents.first_ns = log_time_ns if contents.first_ns is None else contents.first_ns
         contents.last_ns = log_time_ns
         try:
-            _take(contents, keys.parse(key), payload, log_time_ns)
+            key = keys.parse(name)
+            if key.topic in ("skeleton", "truth"):
+                who = (key.subject, key.detail)
+                if who not in arms:
+                    arms[who] = {"skeleton": SkeletonCollector(), "truth": SkeletonCollector()}
+                arms[who][key.topic].take(payload, log_time_ns)
+            else:
+                _take(contents, key, payload)
         except WireError as error:
             _count(contents, error.drop.value)
         except keys.BadKey:
             _count(contents, "bad_key")
+    for who, collectors in arms.items():
+        arm = ArmContents(collectors["skeleton"].columns(), collectors["truth"].columns())
+        if len(arm.published) or len(arm.true):
+            contents.arms[who] = arm
+        for collector in collectors.values():
+            for reason, n in collector.refused.items():
+                _count(contents, reason, n)
     return contents
 
 
-def _count(contents: Contents, reason: str) -> None:
-    contents.unreadable[reason] = contents.unreadable.get(reason, 0) + 1
+def _count(contents: Contents, reason: str, n: int = 1) -> None:
+    contents.unreadable[reason] = contents.unreadable.get(reason, 0) + n
 
 
-def _take(contents: Contents, key: keys.Key, payload: bytes, log_time_ns: int) -> None:
+def _take(contents: Contents, key: keys.Key, payload: bytes) -> None:
     if key.topic in ("health", "command"):
         return
     message = decode_topic(payload, key.topic)
@@ -134,13 +130,6 @@ def _take(contents: Contents, key: keys.Key, payload: bytes, log_time_ns: int) -
     if isinstance(message, SampleBatch):
         sensor = contents.sensors.setdefault(who, SensorContents())
         sensor.counted.feed(message.sequence, len(message.offsets) // 4)
-    elif isinstance(message, Skeleton):
-        arm = contents.arms.setdefault(who, ArmContents())
-        if key.topic == "truth":
-            arm.true.append(message)
-        else:
-            arm.published.append(message)
-            arm.arrived_ns.append(log_time_ns)
     elif isinstance(message, Status):
         contents.sensors.setdefault(who, SensorContents()).status = message
     elif isinstance(message, Info):
@@ -155,36 +144,22 @@ def _take(contents: Contents, key: keys.Key, payload: bytes, log_time_ns: int) -
         contents.fusion[key.subject] = message.settings
 
 
-def times_ns(skeletons: Iterable[Skeleton]) -> Times:
-    """Return the instants (n,)."""
-    return np.array([s.time_ns for s in skeletons], dtype=np.int64)
-
-
-def angles_rad(skeletons: Iterable[Skeleton], names: Iterable[str]) -> Floats:
-    """Return the named angles (n, k), NaN where a skeleton has none."""
-    wanted = list(names)
-    rows = [[s.angles.get(name, np.nan) for name in wanted] for s in skeletons]
-    return np.array(rows, dtype=np.float64).reshape(len(rows), len(wanted))
-
-
-def positions_m(skeletons: Iterable[Skeleton], joint: str) -> Floats:
-    """Return a joint's positions (n, 3) in trunk axes, NaN where a skeleton has none."""
-    unknown = (np.nan, np.nan, np.nan)
-    return np.array([s.positions.get(joint, unknown) for s in skeletons], dtype=np.float64).reshape(-1, 3)
-
-
-def calibrated(skeletons: Iterable[Skeleton]) -> npt.NDArray[np.bool_]:
+def calibrated(skeletons: SkeletonColumns) -> npt.NDArray[np.bool_]:
     """Return which skeletons (n,), in order, are of calibrated sensors.
 
     One of whose segments all are held or missing is what the one before it was; the first is not calibrated.
     """
-    found, state = [], False
-    for skeleton in skeletons:
-        qualities = {pose.quality for pose in skeleton.segments.values()} - {"held", "missing"}
-        if qualities:
-            state = "uncalibrated" not in qualities
-        found.append(state)
-    return np.array(found, dtype=np.bool_)
+    said = skeletons.each(_says_calibrated, np.int8)
+    latest = np.maximum.accumulate(np.where(said == UNSAID, -1, np.arange(len(said))))
+    return np.asarray((latest >= 0) & (said[latest] == 1))
+
+
+UNSAID = -1
+
+
+def _says_calibrated(skeleton: Skeleton) -> int:
+    qualities = {pose.quality for pose in skeleton.segments.values()} - {"held", "missing"}
+    return int("uncalibrated" not in qualities) if qualities else UNSAID
 
 
 def outwards(item: tuple[Who, object]) -> tuple[str, int]:

@@ -104,7 +104,7 @@ def of_contents(contents: Contents, name: str) -> SummaryFigures:
         duration_s=contents.duration_s,
         origins=contents.origins,
         segments=segments(contents),
-        arms={"/".join(who): _arm(arm) for who, arm in sorted(contents.arms.items()) if arm.published},
+        arms={"/".join(who): _arm(arm) for who, arm in sorted(contents.arms.items()) if len(arm.published)},
         unreadable=contents.unreadable,
         warning=contents.warning,
     )
@@ -133,26 +133,26 @@ def _segment(sensor: SensorContents) -> SegmentFigures:
 
 def _arm(arm: ArmContents) -> ArmFigures:
     published = arm.published
-    time_ns, settled = c.times_ns(published), c.calibrated(published)
+    time_ns, settled = published.time_ns, c.calibrated(published)
     p50, p99 = percentiles(latencies_ms(arm))
     span_s = float(time_ns.max() - time_ns.min()) / 1e9
     quality: dict[str, dict[str, int]] = {}
-    for skeleton in published:
+    for skeleton, n in zip(published.examples, np.bincount(published.form).tolist(), strict=True):
         for segment, pose in skeleton.segments.items():
             counts = quality.setdefault(segment, {})
-            counts[pose.quality] = counts.get(pose.quality, 0) + 1
+            counts[pose.quality] = counts.get(pose.quality, 0) + n
     names = _common(arm)
     errors = angle_errors_deg(arm, names)
     angles = {n: f for n, e in zip(names, errors.T, strict=True) if (f := error_figures(e)) is not None}
     clinical = [angles[name].rmse for name in CLINICAL if name in angles]
-    joints = dict.fromkeys(joint for skeleton in arm.true for joint in skeleton.positions)
+    joints = dict.fromkeys(joint for skeleton in arm.true.examples for joint in skeleton.positions)
     positions = {j: f for j in joints if (f := error_figures(position_error_mm(arm, j))) is not None}
     return ArmFigures(
         skeletons=len(published),
         rate_hz=(len(published) - 1) / span_s if span_s > 0 else None,
         latency_p50_ms=p50,
         latency_p99_ms=p99,
-        forward=published[-1].forward,
+        forward=published.last.forward,
         calibrated=int(settled.sum()),
         compared=max([0, *(f.n for f in angles.values()), *(f.n for f in positions.values())]),
         quality=quality,
@@ -164,22 +164,23 @@ def _arm(arm: ArmContents) -> ArmFigures:
 
 def _common(arm: ArmContents) -> list[str]:
     """Return the angles that both the published and the true skeletons hold, in their order."""
-    true = {name for skeleton in arm.true for name in skeleton.angles}
-    return [name for name in dict.fromkeys(n for s in arm.published for n in s.angles) if name in true]
+    true = {name for skeleton in arm.true.examples for name in skeleton.angles}
+    return [
+        name for name in dict.fromkeys(n for s in arm.published.examples for n in s.angles) if name in true
+    ]
 
 
-def latencies_ms(arm: ArmContents) -> list[float]:
-    """Return the latencies that are known; a negative one is of another host's clock and is left out."""
-    pairs = zip(arm.published, arm.arrived_ns, strict=True)
-    found = [(arrived - s.received_ns) / 1e6 for s, arrived in pairs if s.received_ns is not None]
-    return [latency for latency in found if latency >= 0.0]
+def latencies_ms(arm: ArmContents) -> Floats:
+    """Return the latencies (k,) that are known; a negative one is of another host's clock and is left out."""
+    found = (arm.published.arrived_ns - arm.published.received_ns)[arm.published.received] / 1e6
+    return found[found >= 0.0]
 
 
 def angle_errors_deg(arm: ArmContents, names: list[str]) -> Floats:
     """Return published minus true (n, k), within half a turn; NaN before calibration, where assumed, and for
     angles of the plane of elevation where the arm is not raised."""
-    true = true_at(arm, _unwrapped(_ordered(arm, c.angles_rad(arm.true, names))))
-    error = wrap_deg(np.degrees(c.angles_rad(arm.published, names) - true))
+    true = true_at(arm, _unwrapped(_ordered(arm, arm.true.angles_rad(names))))
+    error = wrap_deg(np.degrees(arm.published.angles_rad(names) - true))
     error[~c.calibrated(arm.published)] = np.nan
     low = ~_elevated(arm)
     for i, name in enumerate(names):
@@ -189,36 +190,36 @@ def angle_errors_deg(arm: ArmContents, names: list[str]) -> Floats:
 
 def _elevated(arm: ArmContents) -> npt.NDArray[np.bool_]:
     """Return where the arm is truly raised far enough for its plane to be defined (n,)."""
-    elevation = true_at(arm, _ordered(arm, c.angles_rad(arm.true, ["isb_elevation"])))
+    elevation = true_at(arm, _ordered(arm, arm.true.angles_rad(["isb_elevation"])))
     return np.asarray(np.degrees(elevation[:, 0]) >= ELEVATED_DEG)
 
 
 def position_error_mm(arm: ArmContents, joint: str) -> Floats:
     """Return the distance of the published from the true joint centre (n,), NaN as for angles."""
-    true = true_at(arm, _ordered(arm, c.positions_m(arm.true, joint)))
-    error: Floats = 1e3 * np.linalg.norm(c.positions_m(arm.published, joint) - true, axis=1)
+    true = true_at(arm, _ordered(arm, arm.true.positions_m(joint)))
+    error: Floats = 1e3 * np.linalg.norm(arm.published.positions_m(joint) - true, axis=1)
     error[~c.calibrated(arm.published) | ~measured(arm, joint)] = np.nan
     return error
 
 
 def measured(arm: ArmContents, name: str) -> npt.NDArray[np.bool_]:
     """Return where an angle or position does not rest on an assumption (n,)."""
-    return np.array([s.assumed.get(name) != "assumed" for s in arm.published], dtype=np.bool_)
+    return arm.published.each(lambda skeleton: skeleton.assumed.get(name) != "assumed", np.bool_)
 
 
 def true_at(arm: ArmContents, values: Floats) -> Floats:
     """Return values (m, k) of the true skeletons, ordered by time, at the published instants, (n, k)."""
-    at = np.unique(c.times_ns(arm.true))
+    at = np.unique(arm.true.time_ns)
     start = (
         at[0] if len(at) else 0
     )  # differences are small enough for float64, nanoseconds since 1970 are not
-    wanted = (c.times_ns(arm.published) - start).astype(np.float64)
+    wanted = (arm.published.time_ns - start).astype(np.float64)
     return interpolate(wanted, (at - start).astype(np.float64), values, TRUTH_GAP_S * 1e9)
 
 
 def _ordered(arm: ArmContents, values: Floats) -> Floats:
     """Return the rows of the true skeletons in order of time, each instant once."""
-    _, first = np.unique(c.times_ns(arm.true), return_index=True)
+    _, first = np.unique(arm.true.time_ns, return_index=True)
     return values[first]
 
 

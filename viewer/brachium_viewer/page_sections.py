@@ -9,6 +9,7 @@ from brachium_viewer import contents as c
 from brachium_viewer import figures as f
 from brachium_viewer.contents import Contents
 from brachium_viewer.figures import ArmFigures, SummaryFigures
+from brachium_viewer.metrics.arm_motion import Floats
 from brachium_viewer.statistics import ErrorFigures
 
 JOINT_NAMES = {"shoulder": "shoulder", "elbow": "elbow", "wrist": "wrist", "hand": "fingertip"}
@@ -51,18 +52,18 @@ class PageTable:
 def arm_section(who: c.Who, contents: Contents, figures: ArmFigures) -> Arm:
     """Return one arm's charts: its angles, and how far the fingertip is from the true one."""
     arm = contents.arms[who]
-    start = int(c.times_ns(arm.published).min())
-    time: c.Floats = (c.times_ns(arm.published) - start) / 1e9
+    start = int(arm.published.time_ns.min())
+    time: Floats = (arm.published.time_ns - start) / 1e9
     settled = c.calibrated(arm.published)
     settled_s = float(time[np.argmax(settled)]) if settled.any() else float(time[-1])
     drawn = []
     for name in f.CLINICAL:
-        values = np.degrees(c.angles_rad(arm.published, [name])[:, 0])
+        values = np.degrees(arm.published.angles_rad([name])[:, 0])
         if not np.isfinite(values).any():
             continue
         true = None
-        if arm.true:
-            true = (c.times_ns(arm.true) - start) / 1e9, np.degrees(c.angles_rad(arm.true, [name])[:, 0])
+        if len(arm.true):
+            true = (arm.true.time_ns - start) / 1e9, np.degrees(arm.true.angles_rad([name])[:, 0])
         error = figures.angles_deg.get(name)
         label = (
             f"RMSE {error.rmse:.1f}°"
@@ -79,14 +80,14 @@ def arm_section(who: c.Who, contents: Contents, figures: ArmFigures) -> Arm:
         name = f"{'-'.join(who)}-hand"
         svg = charts.line(name, time, error_mm, "mm", settled_s=settled_s, from_zero=True)
         drawn.append(Chart("Fingertip, distance from true", label, svg))
-    return Arm(f"{who[1].capitalize()} arm of {who[0]}", bool(arm.true), settled_s > time[0], drawn)
+    return Arm(f"{who[1].capitalize()} arm of {who[0]}", bool(len(arm.true)), settled_s > time[0], drawn)
 
 
 def network_charts(contents: Contents, figures: SummaryFigures) -> list[Chart]:
     """Return latency and loss."""
     drawn = []
     for who, arm in sorted(contents.arms.items()):
-        latencies = np.array(f.latencies_ms(arm))
+        latencies = f.latencies_ms(arm)
         if latencies.size:
             found = figures.arms["/".join(who)]
             marks = {"median": found.latency_p50_ms or 0.0, "99 %": found.latency_p99_ms or 0.0}

@@ -1,6 +1,5 @@
 """One arm's motion as arrays: what every measure takes. Pure."""
 
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,6 +8,7 @@ import numpy.typing as npt
 from brachium_body.angles import COLUMNS
 from brachium_body.segments import Side
 from brachium_wire.messages import Origin, Quality, Skeleton
+from brachium_wire.skeleton_columns import SkeletonColumns
 
 Floats = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]
@@ -65,61 +65,32 @@ class ArmMotion:
         )
 
 
-def arm_motion(skeletons: Sequence[Skeleton], zero_ns: int = 0) -> ArmMotion:
+def arm_motion(skeletons: SkeletonColumns, zero_ns: int = 0) -> ArmMotion:
     """Return the motion of one arm's skeletons; times count from `zero_ns`.
 
     Raises ValueError when there are none.
     """
-    if not skeletons:
+    if not len(skeletons):
         raise ValueError("there are no skeletons of this arm; record while fusion runs")
-    n, last = len(skeletons), skeletons[-1]
-    angles = np.full((n, len(COLUMNS)), np.nan)
-    words = np.full((len(COLUMNS) + len(JOINTS), n), "missing", dtype="<U15")
-    places = np.full((len(JOINTS), n, 3), np.nan)
-    shift = np.full((n, 3), np.nan)
-    _fill([s.angles for s in skeletons], _COLUMN, angles)
-    _fill([s.positions for s in skeletons], _JOINT, places.transpose(1, 0, 2))
-    words[: len(COLUMNS)][np.isfinite(angles.T)] = "good"
-    words[len(COLUMNS) :][np.isfinite(places).all(axis=2)] = "good"
-    doubted: dict[tuple[str, str], list[int]] = {}
-    for i, skeleton in enumerate(skeletons):
-        for doubt in skeleton.assumed.items():
-            doubted.setdefault(doubt, []).append(i)
-        if skeleton.shoulder_shift is not None:
-            shift[i] = skeleton.shoulder_shift
-    for (name, quality), which in doubted.items():
-        if name in _WORD:
-            row, rows = words[_WORD[name]], np.array(which)
-            row[rows[row[rows] == "good"]] = quality
+    angles = dict(zip(COLUMNS, np.degrees(skeletons.angles_rad(COLUMNS)).T.copy(), strict=True))
+    places = {joint: skeletons.positions_m(joint) for joint in JOINTS}
+    known = {name: np.isfinite(values) for name, values in angles.items()}
+    known |= {joint: np.isfinite(place).all(axis=1) for joint, place in places.items()}
     return ArmMotion(
-        side=last.side,
-        origin=last.origin,
-        time_s=np.array([(s.time_ns - zero_ns) / 1e9 for s in skeletons], dtype=np.float64),
-        angles_deg=dict(zip(COLUMNS, np.degrees(angles).T, strict=True)),
-        quality=dict(zip((*COLUMNS, *JOINTS), words, strict=True)),
-        positions_m=dict(zip(JOINTS, places, strict=True)),
-        shoulder_shift_m=shift,
-        with_sternum=any(
-            "sternum" in s.segments and s.segments["sternum"].quality != "missing" for s in skeletons
-        ),
+        side=skeletons.last.side,
+        origin=skeletons.last.origin,
+        time_s=(skeletons.time_ns - zero_ns) / 1e9,
+        angles_deg=angles,
+        quality={name: np.where(there, _words(skeletons, name), "missing") for name, there in known.items()},
+        positions_m=places,
+        shoulder_shift_m=skeletons.shoulder_shift_m(),
+        with_sternum=bool(skeletons.each(_with_sternum).any()),
     )
 
 
-_COLUMN = {name: i for i, name in enumerate(COLUMNS)}
-_JOINT = {name: i for i, name in enumerate(JOINTS)}
-_WORD = {name: i for i, name in enumerate((*COLUMNS, *JOINTS))}
+def _words(skeletons: SkeletonColumns, name: str) -> npt.NDArray[np.str_]:
+    return skeletons.each(lambda skeleton: skeleton.assumed.get(name, "good"))
 
 
-def _fill(rows: Sequence[Mapping[str, object]], columns: Mapping[str, int], out: Floats) -> None:
-    """Put what each row (n,) holds by name into its columns of out (n, k) or (n, k, 3).
-
-    Rows that hold the same names are put in at once: an arm has the same angles for minutes.
-    """
-    alike: dict[tuple[str, ...], list[int]] = {}
-    for i, row in enumerate(rows):
-        alike.setdefault(tuple(row), []).append(i)
-    for names, which in alike.items():
-        held = [k for k, name in enumerate(names) if name in columns]
-        if held:
-            table = np.array([tuple(rows[i].values()) for i in which], dtype=np.float64)
-            out[np.ix_(which, [columns[names[k]] for k in held])] = table[:, held]
+def _with_sternum(skeleton: Skeleton) -> bool:
+    return "sternum" in skeleton.segments and skeleton.segments["sternum"].quality != "missing"

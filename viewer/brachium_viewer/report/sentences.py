@@ -26,9 +26,9 @@ def how_zero_was_set(report: Report) -> str:
     subject = report.session.subject
     found = report.contents.calibrations.get(subject)
     forward = {
-        arm.published[-1].forward
+        arm.published.last.forward
         for (who, _), arm in report.contents.arms.items()
-        if who == subject and arm.published
+        if who == subject and len(arm.published)
     }
     facing = "; ".join(words.FORWARD[one] for one in sorted(forward))
     if found is None or not (found.pose or found.mounting or found.state == "done"):

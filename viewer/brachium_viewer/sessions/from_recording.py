@@ -68,16 +68,16 @@ def motions(contents: Contents, subject: str) -> dict[Side, ArmMotion]:
     return {
         side: arm_motion(arm.published, zero)
         for side in SIDES
-        if (arm := contents.arms.get((subject, side))) is not None and arm.published
+        if (arm := contents.arms.get((subject, side))) is not None and len(arm.published)
     }
 
 
 def zero_ns(contents: Contents, subject: str) -> int:
     """Return the instant of a subject's first skeleton, from which a session's seconds count."""
     arms = [
-        arm.published[0].time_ns
+        int(arm.published.time_ns[0])
         for (who, _), arm in contents.arms.items()
-        if who == subject and arm.published
+        if who == subject and len(arm.published)
     ]
     return min(arms, default=contents.first_ns or 0)
 
@@ -154,7 +154,7 @@ def origin(contents: Contents, subject: str) -> Origin:
     }
     for (who, _), arm in contents.arms.items():
         if who == subject:
-            found |= {s.origin for s in arm.published}
+            found |= {s.origin for s in arm.published.examples}
     for word in ("emulated", "playback", "worn"):
         if word in found:
             return word
@@ -183,7 +183,7 @@ def _unmarked(
         arm = contents.arms[subject, one.side]
         settled = c.calibrated(arm.published)
         if settled.any():
-            first = arm.published[int(np.argmax(settled))].time_ns
+            first = int(arm.published.time_ns[np.argmax(settled)])
             found.append(Span(begins=one, from_ns=first, to_ns=end, ended="done", donning=0))
     return found
 
