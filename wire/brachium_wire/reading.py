@@ -3,7 +3,7 @@
 import logging
 import struct
 from collections.abc import Generator, Iterator
-from io import BytesIO
+from io import BufferedReader, BytesIO
 from pathlib import Path
 from types import TracebackType
 from typing import NamedTuple, Self
@@ -13,7 +13,7 @@ from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode
 from mcap.records import Channel, Chunk, Header, Metadata
-from mcap.stream_reader import StreamReader, get_chunk_data_stream
+from mcap.stream_reader import get_chunk_data_stream
 
 log = logging.getLogger(__name__)
 
@@ -52,9 +52,7 @@ class Reading:
         self._size = path.stat().st_size
         self._file = path.open("rb")
         try:
-            self._records = iter(
-                StreamReader(self._file, emit_chunks=True, record_size_limit=self._size).records
-            )
+            self._records = _records(self._file, self._size)
             self._check_header()
         except BaseException:
             self._file.close()
@@ -62,7 +60,7 @@ class Reading:
         self._messages = self._read()
 
     def __iter__(self) -> Iterator[Recorded]:
-        return self
+        return self._messages
 
     def __next__(self) -> Recorded:
         return next(self._messages)
@@ -84,34 +82,35 @@ class Reading:
         if self._file.peek(len(MAGIC))[: len(MAGIC)] != MAGIC:
             raise RecordingError(f"{self.path}: not a recording (an MCAP file); made by: brachium record")
         try:
-            header, first = next(self._records), next(self._records, None)
+            opcode, content = next(self._records)
+            profile = Header.read(_stream(content)).profile if opcode == Opcode.HEADER else ""
+            first, more = next(self._records, (None, b""))
+            told = Metadata.read(_stream(more)).metadata if first == Opcode.METADATA else {}
         except (*DAMAGE, StopIteration):
             raise RecordingError(
                 f"{self.path}: a recording cut before its first message; nothing can be read"
             ) from None
-        if not isinstance(header, Header) or header.profile != PROFILE:
-            profile = header.profile if isinstance(header, Header) else ""
+        if profile != PROFILE:
             raise RecordingError(
                 f"{self.path}: an MCAP file of another program (profile {profile!r}), not a recording"
             )
-        if isinstance(first, Metadata):
-            self.metadata = {str(name): str(value) for name, value in first.metadata.items()}
+        self.metadata = {str(name): str(value) for name, value in told.items()}
 
     def _read(self) -> Generator[Recorded, None, None]:
         try:
             with self._file:
-                for record in self._records:
-                    if isinstance(record, Chunk):
-                        yield from self._unpack(record)
+                for opcode, content in self._records:
+                    if opcode == Opcode.CHUNK:
+                        yield from self._unpack(content)
             self.closed = True
         except DAMAGE as error:
             where = self._size if self._file.closed else self._file.tell()
             log.debug("%s: %s near byte %d", self.path, error, where)
         self._conclude()
 
-    def _unpack(self, chunk: Chunk) -> Iterator[Recorded]:
+    def _unpack(self, content: bytes) -> Iterator[Recorded]:
         try:
-            channels, messages = _in_chunk(chunk)
+            channels, messages = _in_chunk(Chunk.read(_stream(content)))
         except DAMAGE:
             self._bad_chunks += 1
             return
@@ -137,6 +136,27 @@ class Reading:
             self.warning = f"{self.path}: {'; '.join(said)}"
 
 
+def _records(file: BufferedReader, size: int) -> Iterator[tuple[int, bytes]]:
+    """Yield kind and content of every record of a file of this size, up to the one that ends it.
+
+    A recording's index is longer than its records are many: it is passed over. Raises one of DAMAGE.
+    """
+    file.read(len(MAGIC))
+    opcode = 0
+    while opcode != Opcode.FOOTER:
+        opcode, length = _RECORD.unpack(file.read(_RECORD.size))
+        content = file.read(min(length, size))
+        if len(content) < length:
+            raise ValueError("the file ends within a record")
+        yield opcode, content
+    if file.read(len(MAGIC)) != MAGIC:
+        raise ValueError("the file ends with something else")
+
+
+def _stream(content: bytes) -> ReadDataStream:
+    return ReadDataStream(BytesIO(content))
+
+
 def _in_chunk(chunk: Chunk) -> tuple[dict[int, str], list[tuple[int, int, bytes]]]:
     """Return a chunk's channels, number to key, and its messages: channel, log time in ns, bytes.
 
@@ -157,7 +177,7 @@ def _in_chunk(chunk: Chunk) -> tuple[dict[int, str], list[tuple[int, int, bytes]
             number, _, log_time_ns, _ = _MESSAGE.unpack_from(data, at)
             messages.append((number, log_time_ns, data[at + _MESSAGE.size : end]))
         elif opcode == Opcode.CHANNEL:
-            channel = Channel.read(ReadDataStream(BytesIO(data[at:end])))
+            channel = Channel.read(_stream(data[at:end]))
             channels[channel.id] = channel.topic
         at = end
     return channels, messages
