@@ -3,8 +3,11 @@
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.ndimage import uniform_filter1d
+from scipy.signal import butter, sosfiltfilt
 
 from brachium_viewer.metrics.even_grid import BRIDGED_S, even, smooth, stretches
+from brachium_viewer.metrics.kinematics import HOLD_S, RATE_HZ, held_mean
 
 
 def test_a_short_gap_is_bridged_and_a_long_one_stays() -> None:
@@ -40,6 +43,32 @@ def test_smoothing_has_no_delay_and_does_not_cross_gaps() -> None:
     out = smooth(cut, 50.0, 4.0)
     assert np.isnan(out[200:260]).all()
     assert np.isfinite(np.delete(out, np.s_[200:260])).all()
+
+
+@given(
+    seed=st.integers(0, 100),
+    n=st.integers(1, 200),
+    columns=st.integers(1, 3),
+    rate_hz=st.sampled_from([25.0, 50.0, 100.0]),
+    cutoff_hz=st.sampled_from([0.5, 1.0, 4.0, 6.0, 12.0]),
+)
+def test_smoothing_is_scipys(seed: int, n: int, columns: int, rate_hz: float, cutoff_hz: float) -> None:
+    values = np.random.default_rng(seed).normal(40.0, 30.0, size=(n, columns))
+    sections = butter(2, cutoff_hz, fs=rate_hz, output="sos")
+    judge = sosfiltfilt(sections, values, axis=0, padlen=min(n - 1, round(rate_hz / cutoff_hz)))
+    assert np.allclose(smooth(values, rate_hz, cutoff_hz), judge, rtol=0.0, atol=1e-9)
+    assert np.array_equal(smooth(values[:, 0], rate_hz, cutoff_hz), smooth(values, rate_hz, cutoff_hz)[:, 0])
+
+
+@given(seed=st.integers(0, 100), n=st.integers(0, 60))
+def test_the_held_mean_is_scipys(seed: int, n: int) -> None:
+    values = np.random.default_rng(seed).normal(40.0, 30.0, size=n)
+    _, found = held_mean(np.arange(n) / RATE_HZ, values)
+    width = round(HOLD_S * RATE_HZ)
+    if n < width:
+        assert np.isnan(found).all()
+    else:
+        assert np.allclose(found, uniform_filter1d(values, width, mode="nearest"), rtol=0.0, atol=1e-9)
 
 
 def test_nothing_known_is_an_empty_grid() -> None:

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.interpolate import make_interp_spline
 
 from brachium_viewer.metrics.smoothness import at_ldlj_rate, ldlj, sparc
 
@@ -38,8 +39,17 @@ def test_jerk_depends_on_the_rate_and_tends_to_the_value_on_paper(rate_hz: float
 
 
 def test_resampled_speeds_compare() -> None:
-    slow, fast = (at_ldlj_rate(np.arange(0, 2.0, 1 / r), reach(2.0, r)) for r in (60.0, 240.0))
+    slow, fast = (at_ldlj_rate(reach(2.0, r), r) for r in (60.0, 240.0))
     assert ldlj(slow, 100.0) == pytest.approx(ldlj(fast, 100.0), abs=0.06)
+
+
+@given(st.lists(st.floats(-100.0, 100.0), min_size=4, max_size=60), st.sampled_from([50.0, 60.0, 240.0]))
+def test_resampling_is_scipys_spline(speed: list[float], rate_hz: float) -> None:
+    found = at_ldlj_rate(np.array(speed), rate_hz)
+    times = np.arange(len(speed)) / rate_hz
+    judge = make_interp_spline(times, speed, k=3)(np.minimum(np.arange(len(found)) / 100.0, times[-1]))
+    assert found == pytest.approx(judge, abs=1e-8)
+    assert len(found) == int(times[-1] * 100.0 + 1e-6) + 1
 
 
 @given(factor=st.floats(1e-3, 1e3), seconds=st.floats(0.5, 4.0))

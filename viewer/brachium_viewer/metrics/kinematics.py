@@ -6,7 +6,6 @@ adds nothing to a range.
 
 import numpy as np
 import numpy.typing as npt
-from scipy.ndimage import uniform_filter1d
 
 from brachium_viewer.metrics.even_grid import even, smooth, stretches
 
@@ -27,7 +26,8 @@ def held_mean(time_s: Floats, values: Floats) -> tuple[Floats, Floats]:
     width = round(HOLD_S * RATE_HZ)
     for first, end in stretches(np.isfinite(found)):
         if end - first >= width:
-            out[first:end] = uniform_filter1d(found[first:end], width, mode="nearest")
+            longer = np.pad(found[first:end], (width // 2, (width - 1) // 2), mode="edge")
+            out[first:end] = np.convolve(longer, np.full(width, 1.0 / width), mode="valid")
     return grid, out
 
 

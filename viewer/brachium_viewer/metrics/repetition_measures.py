@@ -10,7 +10,7 @@ from brachium_viewer.metrics import kinematics
 from brachium_viewer.metrics.arm_motion import ArmMotion, Floats
 from brachium_viewer.metrics.measure import ENOUGH, Measure, measure, why_not, withheld
 from brachium_viewer.metrics.repetitions import FLOOR_DEG, MovementSet, Repetition, movement_set
-from brachium_viewer.metrics.smoothness import at_ldlj_rate, ldlj, sparc
+from brachium_viewer.metrics.smoothness import LDLJ_RATE_HZ, at_ldlj_rate, ldlj, sparc
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -143,7 +143,7 @@ def _of_the_way(there: ArmMotion, exercise: Exercise) -> dict[str, Measure]:
         float(speed.max()),
         float(speed.mean()),
         sparc(speed, rate),
-        ldlj(at_ldlj_rate(grid, speed), 100.0),
+        ldlj(at_ldlj_rate(speed, rate), LDLJ_RATE_HZ),
     )
     return {name: measure(value, NAMES[name], coverage) for name, value in zip(names, numbers, strict=True)}
 

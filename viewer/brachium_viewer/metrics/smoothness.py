@@ -6,7 +6,6 @@ and the logarithm of its dimensionless jerk. Closer to 0 is smoother in both.
 
 import numpy as np
 import numpy.typing as npt
-from scipy.interpolate import make_interp_spline
 
 Floats = npt.NDArray[np.float64]
 
@@ -54,10 +53,33 @@ def ldlj(speed: Floats, rate_hz: float) -> float:
     return -float(np.log(duration**3 / peak**2 * np.sum(jerk**2) / rate_hz))
 
 
-def at_ldlj_rate(time_s: Floats, speed: Floats) -> Floats:
-    """Return the speed (n,) at growing times (n,) s, resampled to LDLJ_RATE_HZ.
+def at_ldlj_rate(speed: Floats, rate_hz: float) -> Floats:
+    """Return the speed (n,), n >= 4, resampled from one even rate to LDLJ_RATE_HZ.
 
-    By cubic splines: straight lines would add jerk.
+    By a cubic spline (not a knot next to its ends): straight lines would add jerk.
     """
-    grid = np.arange(time_s[0], time_s[-1] + 1e-9, 1.0 / LDLJ_RATE_HZ)
-    return np.asarray(make_interp_spline(time_s, speed, k=3)(grid), dtype=np.float64)
+    bend = _bend(speed)
+    at = rate_hz * np.arange(0.0, (len(speed) - 1) / rate_hz + 1e-9, 1.0 / LDLJ_RATE_HZ)
+    i = np.minimum(at.astype(np.int64), len(speed) - 2)
+    right, left = at - i, 1.0 - (at - i)
+    straight = left * speed[i] + right * speed[i + 1]
+    return np.asarray(straight + (left**3 - left) * bend[i] + (right**3 - right) * bend[i + 1])
+
+
+def _bend(values: Floats) -> Floats:
+    """Return a sixth of the spline's second derivative (n,) at even values (n,), times the step squared.
+
+    bend[i - 1] + 4 bend[i] + bend[i + 1] is the second difference at i. Not a knot: the first three are on a
+    line, and the last three, so the second one is a sixth of its difference. Solved by elimination.
+    """
+    second = np.diff(values, 2)
+    inner = (second / 6.0).tolist()
+    weights = [0.0]
+    for i, difference in enumerate(second.tolist()[1:-1], start=1):
+        weight = 1.0 / (4.0 - weights[-1])
+        inner[i] = (difference - inner[i - 1]) * weight
+        weights.append(weight)
+    for i in range(len(inner) - 2, 0, -1):
+        inner[i] -= weights[i] * inner[i + 1]
+    ends = 2.0 * inner[0] - inner[1], 2.0 * inner[-1] - inner[-2]
+    return np.array([ends[0], *inner, ends[1]])
