@@ -1,7 +1,8 @@
 """What the therapist's page costs and how late it draws, beside a page that draws an empty canvas.
 
 A skeleton is published with the moment of its publication as its time; a picture counts as drawn when the
-browser begins the next one. Both pages hang on the same server, one after the other, in the same run.
+browser begins the next one. Both pages hang on the same server, one after the other, in the same run; each is
+opened once and watched for several windows.
 """
 
 import shutil
@@ -117,10 +118,8 @@ def measure(window_s: float) -> PageFigures:
         with Bus.open(endpoint) as bus, SkeletonSource(bus), chromium() as browser:
             server, address = start_pages(processes, folder, endpoint, bus)
             alone = [_cpu(server, window_s) for _ in range(WINDOWS)]
-            page, empty = [], []
-            for _ in range(WINDOWS):
-                page.append(_watched(browser, server, f"{address}/", window_s))
-                empty.append(_watched(browser, server, f"{address}/door", window_s, empty=True))
+            page = _watched(browser, server, f"{address}/", window_s)
+            empty = _watched(browser, server, f"{address}/door", window_s, empty=True)
             renderer = _renderer(browser, address)
     return PageFigures(
         page_p50_ms=median(w.p50_ms for w in page),
@@ -174,8 +173,8 @@ def chromium() -> "Iterator[Browser]":
 
 def _watched(
     browser: "Browser", server: Child, address: str, window_s: float, *, empty: bool = False
-) -> _Window:
-    """Open a page, let it settle, and return how late it drew and what the server used meanwhile."""
+) -> list[_Window]:
+    """Open a page, let it settle; return by window how late it drew and what the server used meanwhile."""
     page = browser.new_page(viewport={"width": 1400, "height": 900})
     try:
         page.add_init_script(LISTENER)
@@ -184,11 +183,15 @@ def _watched(
             page.evaluate(EMPTY)
         _begun(page, address)
         page.wait_for_timeout(SETTLE_S * 1e3)
-        page.evaluate("window.__late.length = 0")
-        cpu = _cpu(server, window_s, page)
-        late = page.evaluate("window.__late")
+        return [_window(page, server, address, window_s) for _ in range(WINDOWS)]
     finally:
         page.close()
+
+
+def _window(page: "Page", server: Child, address: str, window_s: float) -> _Window:
+    page.evaluate("window.__late.length = 0")
+    cpu = _cpu(server, window_s, page)
+    late = page.evaluate("window.__late")
     if not late:
         raise Failed(f"{address}: nothing was drawn")
     p50, p99 = percentiles(list(map(float, late)))

@@ -92,7 +92,7 @@ def _other(args: argparse.Namespace) -> int:
     elif args.page:
         from brachium import bench_page
 
-        found = bench_page.measure(QUICK_WINDOW_S if args.quick else 2.0 * WINDOW_S)
+        found = bench_page.measure(QUICK_WINDOW_S if args.quick else 1.5 * WINDOW_S)
     elif args.report:
         from brachium import bench_report
 

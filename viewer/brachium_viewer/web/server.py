@@ -15,6 +15,7 @@ from aiohttp import web
 from brachium_viewer.web import frames
 from brachium_viewer.web.desk import Desk
 from brachium_viewer.web.door import Door, is_loopback
+from brachium_viewer.web.pace import Bell, Pace
 from brachium_viewer.web.page_state import PageState
 from brachium_viewer.web.rooms import Rooms
 from brachium_viewer.web.seats import Seat
@@ -28,6 +29,10 @@ log = logging.getLogger(__name__)
 
 RATE_HZ = 30.0
 """Frames a second to each screen."""
+PATIENCE_S = 0.025
+"""The next skeleton at 50 Hz comes within this; a slower one is not waited for with what came before."""
+TOGETHER_S = 0.002
+"""Both arms of a person are solved at once: the second's skeleton comes right behind the first's."""
 STATE_S = 0.2
 """Between two states; one that says nothing new is not sent."""
 END_S = 1.0
@@ -112,16 +117,16 @@ class _Server:
         runner, address = await self._open()
         heart.text = address
         try:
-            due = time.monotonic()
+            pace, bell = Pace(RATE_HZ), Bell(inboxes[0])
             while not stop.is_set():
-                self._take(inboxes)
+                await self._news(inboxes, bell)
                 self._tell()
+                pace.gone(time.monotonic())
                 heart.counts["screens"] = len(self._seats)
                 heart.counts["frames_skipped"] = self._left + sum(seat.skipped for seat in self._seats)
                 heart.drops["overflow"] = sum(inbox.dropped for inbox in inboxes)
                 heart.beat()
-                due = max(due + 1.0 / RATE_HZ, time.monotonic())
-                await asyncio.sleep(due - time.monotonic())
+                await asyncio.sleep(pace.pause_s(time.monotonic()) if self._seats else STATE_S)
         finally:
             await runner.cleanup()
             await asyncio.to_thread(self._sessions.close)
@@ -159,6 +164,14 @@ class _Server:
         if settings.on_ready is not None:
             settings.on_ready(address)
         return runner, address
+
+    async def _news(self, inboxes: list[Inbox], bell: Bell) -> None:
+        """Take what came, and for a screen that looks also the skeletons that come next."""
+        bell.arm()
+        self._take(inboxes)
+        if self._seats and await bell.rings(PATIENCE_S):
+            await asyncio.sleep(TOGETHER_S)
+            self._take(inboxes)
 
     def _take(self, inboxes: list[Inbox]) -> None:
         now_ns = self._clock.now_ns()

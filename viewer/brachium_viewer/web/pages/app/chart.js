@@ -9,9 +9,7 @@ const PAUSE_MS = 90; // between two drawings: fast enough for an eye, and cheap
 const STEP_S = 0.03;
 const GAP_S = 0.3;
 
-function colour(name) {
-  return getComputedStyle(document.documentElement).getPropertyValue(name).trim();
-}
+const COLOURS = ["--muted", "--line", "--trace", "--band", "--bad", "--good", "--ink", "--goal", "--surface"];
 
 export class Chart {
   constructor(box) {
@@ -37,9 +35,12 @@ export class Chart {
 
   make() {
     this.plot?.destroy();
+    const style = getComputedStyle(document.documentElement); // asked once: the answer costs a look at the whole page
+    const colours = Object.fromEntries(COLOURS.map((name) => [name, style.getPropertyValue(name).trim()]));
+    this.colour = (name) => colours[name];
     const axis = {
-      stroke: colour("--muted"),
-      grid: { stroke: colour("--line"), width: 1 },
+      stroke: this.colour("--muted"),
+      grid: { stroke: this.colour("--line"), width: 1 },
       ticks: { show: false },
       font: "12px system-ui, sans-serif",
     };
@@ -56,8 +57,8 @@ export class Chart {
         ],
         series: [
           {},
-          { stroke: colour("--trace"), width: 2.5, spanGaps: false, points: { show: false } },
-          { stroke: colour("--muted"), width: 2, dash: [4, 4], spanGaps: false, points: { show: false } },
+          { stroke: this.colour("--trace"), width: 2.5, spanGaps: false, points: { show: false } },
+          { stroke: this.colour("--muted"), width: 2, dash: [4, 4], spanGaps: false, points: { show: false } },
         ],
         hooks: { drawAxes: [(plot) => this.under(plot)] },
       },
@@ -94,7 +95,17 @@ export class Chart {
       this.measured.shift();
       this.doubtful.shift();
     }
-    if (performance.now() - this.drawn > PAUSE_MS) this.draw();
+    if (performance.now() - this.drawn > PAUSE_MS) this.later();
+  }
+
+  /** Draw behind the picture: the arm is not kept waiting. */
+  later() {
+    if (this.due) return;
+    this.due = true;
+    requestAnimationFrame(() => setTimeout(() => {
+      this.due = false;
+      this.draw();
+    }));
   }
 
   push(time, measured, doubtful) {
@@ -126,11 +137,11 @@ export class Chart {
     ctx.clip();
     ctx.font = `600 ${12 * ratio}px system-ui, sans-serif`;
     if (band) {
-      ctx.fillStyle = colour("--band");
+      ctx.fillStyle = this.colour("--band");
       ctx.fillRect(bbox.left, at(band[1]), bbox.width, at(band[0]) - at(band[1]));
     }
     if (limit != null) {
-      ctx.fillStyle = colour("--bad");
+      ctx.fillStyle = this.colour("--bad");
       ctx.globalAlpha = 0.14; // the reference is still seen behind it
       const edge = at(limit);
       if (rises) ctx.fillRect(bbox.left, bbox.top, bbox.width, edge - bbox.top);
@@ -148,7 +159,7 @@ export class Chart {
   line(ctx, bbox, value, at, name, dash, word, x, below) {
     if (value == null) return;
     const ratio = devicePixelRatio;
-    ctx.strokeStyle = colour(name);
+    ctx.strokeStyle = this.colour(name);
     ctx.lineWidth = 2 * ratio;
     ctx.setLineDash(dash.map((part) => part * ratio));
     ctx.beginPath();
@@ -163,9 +174,9 @@ export class Chart {
     ctx.setLineDash([]);
     ctx.lineWidth = 4 * devicePixelRatio;
     ctx.lineJoin = "round";
-    ctx.strokeStyle = colour("--surface");
+    ctx.strokeStyle = this.colour("--surface");
     ctx.strokeText(text, x, y);
-    ctx.fillStyle = colour(name);
+    ctx.fillStyle = this.colour(name);
     ctx.fillText(text, x, y);
   }
 }

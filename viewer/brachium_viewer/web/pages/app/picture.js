@@ -3,6 +3,7 @@
 import * as THREE from "../vendor/three/three.module.js";
 import { OrbitControls } from "../vendor/three/OrbitControls.js";
 import { Figure } from "./figure.js";
+import { painter } from "./painter.js";
 import { dark } from "./theme.js";
 
 const BOTTOM = 0.5; // m above the floor: a hanging hand
@@ -19,9 +20,7 @@ export class Picture {
     this.scene = new THREE.Scene();
     this.camera = new THREE.PerspectiveCamera(FOV_DEG, 1, 0.1, 30);
     this.camera.up.set(0, 0, 1);
-    this.renderer = new THREE.WebGLRenderer({ antialias: true, alpha: true });
-    this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
-    box.append(this.renderer.domElement);
+    this.renderer = painter(box);
     this.floor = this.ground();
     this.figure = new Figure(this.scene);
     box.drawn = () => this.figure.drawn();

@@ -2,6 +2,7 @@
 
 import * as THREE from "../vendor/three/three.module.js";
 import { Figure } from "../app/figure.js";
+import { painter } from "../app/painter.js";
 import { dark } from "../app/theme.js";
 
 const CHEST = 1.34; // m above the floor: the middle of what is shown
@@ -14,12 +15,10 @@ export class Mirror {
     this.place = place;
     this.side = "right";
     try {
-      this.renderer = new THREE.WebGLRenderer({ antialias: true, alpha: true });
+      this.renderer = painter(place);
     } catch {
       return; // a device that draws nothing in three dimensions: count and words remain
     }
-    this.renderer.setPixelRatio(Math.min(2, devicePixelRatio));
-    place.append(this.renderer.domElement);
     this.scene = new THREE.Scene();
     this.scene.scale.x = -1; // the mirror
     this.camera = new THREE.PerspectiveCamera(ANGLE, 1, 0.1, 20);
