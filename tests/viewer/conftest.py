@@ -1,11 +1,14 @@
 """A moving arm as skeletons, a router to send them through, and the view that shows them."""
 
+import ast
 import errno
 import os
+import re
 import socket
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -163,3 +166,39 @@ def disk(monkeypatch: pytest.MonkeyPatch) -> SimpleNamespace:
     monkeypatch.setattr(growing_file.GrowingFile, "push", bounded)
     monkeypatch.setattr(growing_file.GrowingFile, "release", given_back)
     return one
+
+
+BLANK = re.compile(r"\{[^{}]*\}")
+
+
+def literals(path: Path) -> Iterator[str]:
+    """Return a module's texts, f-strings with `{}` for each value; docstrings and logs are left out."""
+    tree = ast.parse(path.read_text("utf-8"))
+    aside: set[ast.AST] = set()
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant):
+            aside.add(node.value)
+        elif isinstance(node, ast.JoinedStr):
+            aside.update(part for value in node.values for part in ast.walk(value) if part is not node)
+            aside -= {
+                part
+                for value in node.values
+                if isinstance(value, ast.FormattedValue)
+                for part in ast.walk(value.value)
+                if isinstance(part, ast.JoinedStr | ast.Constant)
+            }
+        elif isinstance(node, ast.Call) and ast.unparse(node.func).startswith("log."):
+            aside.update(ast.walk(node))
+    for node in ast.walk(tree):
+        if node in aside:
+            continue
+        if isinstance(node, ast.Constant) and isinstance(node.value, str):
+            yield BLANK.sub("{}", node.value)
+        elif isinstance(node, ast.JoinedStr):
+            yield "".join(str(v.value) if isinstance(v, ast.Constant) else "{}" for v in node.values)
+
+
+@pytest.fixture(scope="session")
+def texts_in() -> Callable[[Path], list[str]]:
+    """The texts in a module's code, f-strings with `{}` for each value."""
+    return lambda path: list(literals(path))

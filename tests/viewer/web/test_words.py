@@ -21,7 +21,9 @@ PRAISE = ("well done", "great", "good job", "improved", "super", "toll", "prima"
 
 
 def words(language: str) -> dict[str, str]:
-    return json.loads((FOLDER / "words" / f"{language}.json").read_text("utf-8"))
+    """Return the words that pages have keys for; sentences that are their own key are test_reasons.py's."""
+    found = json.loads((FOLDER / "words" / f"{language}.json").read_text("utf-8"))
+    return {key: text for key, text in found.items() if " " not in key}
 
 
 class Texts(HTMLParser):

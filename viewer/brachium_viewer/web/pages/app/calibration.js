@@ -1,7 +1,7 @@
 // Calibration as a person is led through it: what to do now, how far it is, how it went.
 
 import { $, busy, make, renew, tell } from "./page.js";
-import { has, say } from "./words.js";
+import { has, say, told } from "./words.js";
 
 const RUNNING = new Set(["waiting", "running"]);
 
@@ -60,7 +60,7 @@ export class Calibration {
     }
     if (news === null || !RUNNING.has(news.state) || !(this.asked || news.state === "running")) return null;
     const key = `motion.${news.motion || news.pose}`;
-    return { words: has(key) ? say(key) : news.reason, progress: news.progress };
+    return { words: has(key) ? say(key) : told(news.reason), progress: news.progress };
   }
 
   show(news) {
@@ -75,8 +75,8 @@ export class Calibration {
     }
     this.seats(news?.wear);
     $("calibration-state").classList.toggle("wrong", Boolean(this.refused));
-    $("calibration-state").textContent = this.refused || this.words(news);
-    const notes = news === null || runs ? [] : [...Object.values(news.refused), ...news.warnings];
+    $("calibration-state").textContent = told(this.refused) || this.words(news);
+    const notes = news === null || runs ? [] : [...Object.values(news.refused), ...news.warnings].map(told);
     renew($("calibration-notes"), JSON.stringify(notes), () => notes.map((note) => make("li", {}, note)));
   }
 
@@ -90,7 +90,7 @@ export class Calibration {
   words(news) {
     if (news === null || news.state === "none") return say("calibration.none");
     if (news.state === "done") return `${say("calibration.done")} ${say(`forward.${news.forward}`)}`;
-    if (news.state === "refused") return news.reason;
+    if (news.state === "refused") return told(news.reason);
     return say("calibration.running");
   }
 }

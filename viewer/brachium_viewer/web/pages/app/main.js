@@ -12,7 +12,7 @@ import { showHeadline, showParts, showSensors } from "./sensors.js";
 import { Tabs } from "./tabs.js";
 import { switchTheme } from "./theme.js";
 import { sounds, switchSound } from "./tone.js";
-import { language, say, speak } from "./words.js";
+import { language, say, speak, told } from "./words.js";
 
 let state = null;
 let set = 1;
@@ -85,7 +85,7 @@ function recording() {
   $("recording").hidden = how !== "on";
   const time = `${Math.floor((seconds ?? 0) / 60)}:${String((seconds ?? 0) % 60).padStart(2, "0")}`;
   $("recording").textContent = say("recording", { time });
-  const alarms = state.alarms.map(({ what, reason }) => say(`alarm.${what}`, { reason }));
+  const alarms = state.alarms.map(({ what, reason }) => say(`alarm.${what}`, { reason: told(reason) }));
   if (state.stopped) alarms.unshift(say("alarm.stopped", { reason: say(`patient.reason.${state.stopped}`) }));
   renew($("alarm"), alarms.join(), () => alarms.map((text) => make("p", {}, text)));
 }
@@ -132,7 +132,7 @@ $("report").addEventListener("click", async () => {
   $("report-open").hidden = true;
   tell($("report-said"), { ok: true }, say("report.making"));
   const answer = await busy($("report"), () => link.ask("report"));
-  const notes = [answer.data?.ended, answer.data?.why].filter(Boolean).join(" ");
+  const notes = [answer.data?.ended, answer.data?.why].filter(Boolean).map(told).join(" ");
   tell($("report-said"), answer, `${say("report.done", { file: answer.data?.recording ?? "" })} ${notes}`);
   if (!answer.ok) return;
   set = 1;

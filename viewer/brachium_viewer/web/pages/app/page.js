@@ -1,6 +1,6 @@
 // What every part of a page needs: its elements, and answers said where they were asked for.
 
-import { say } from "./words.js";
+import { say, told } from "./words.js";
 
 export const $ = (id) => document.getElementById(id);
 
@@ -27,7 +27,7 @@ export function renew(element, key, children) {
 /** Say an answer in an element: what was done, or why not. */
 export function tell(element, answer, done = "") {
   element.classList.toggle("wrong", !answer.ok);
-  element.textContent = answer.ok ? done : answer.reason || say("no-answer");
+  element.textContent = answer.ok ? done : told(answer.reason) || say("no-answer");
 }
 
 /** Run a question while its button is busy; returns the answer. */

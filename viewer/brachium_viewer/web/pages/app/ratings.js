@@ -1,7 +1,7 @@
 // Pain and effort, 0 to 10, before and after.
 
 import { make } from "./page.js";
-import { fill, say } from "./words.js";
+import { fill, say, told } from "./words.js";
 
 const WHAT = ["pain", "effort"];
 
@@ -13,7 +13,7 @@ function scale(link, what, when) {
     input.addEventListener("change", async () => {
       const answer = await link.ask(what, { value, when });
       said.classList.toggle("wrong", !answer.ok);
-      said.textContent = answer.ok ? say("kept") : answer.reason || say("no-answer");
+      said.textContent = answer.ok ? say("kept") : told(answer.reason) || say("no-answer");
       if (!answer.ok) input.checked = false;
     });
     return make("label", {}, input, make("span", {}, String(value)));

@@ -1,9 +1,14 @@
 // Every word that is shown, out of one catalogue a language: /words/en.json, /words/de.json.
+//
+// Services say in English why something cannot be. Such a sentence is its own key in the other languages'
+// catalogues, with {names} where it has figures.
 
 export const LANGUAGES = ["en", "de"];
 const KEPT = "brachium-language";
 
 let words = {};
+let sentences = [];
+let known = new Map();
 export let language = "en";
 
 function chosen() {
@@ -18,6 +23,8 @@ export async function speak(wanted = chosen()) {
   const answer = await fetch(`/words/${wanted}.json`);
   words = await answer.json();
   language = wanted;
+  sentences = Object.keys(words).filter((key) => key.includes(" ")).map(sentence).sort((a, b) => b.weight - a.weight);
+  known = new Map();
   localStorage.setItem(KEPT, wanted);
   document.documentElement.lang = wanted;
   fill(document);
@@ -28,6 +35,59 @@ export async function speak(wanted = chosen()) {
 export function say(key, values = {}) {
   const text = words[key] ?? key;
   return text.replace(/\{(\w+)\}/g, (whole, name) => values[name] ?? whole);
+}
+
+/** A sentence that a service said in English, in this language; one that no catalogue knows stays as it came. */
+export function told(text) {
+  if (!text) return "";
+  if (!known.has(text)) known.set(text, whole(text) ?? joined(text, "; ", told) ?? named(text));
+  return known.get(text);
+}
+
+const BLANK = /\{(\w+)\}/g;
+
+function sentence(key) {
+  const literal = key.split(/\{\w+\}/).map((part) => part.replace(/[.*+?^${}()|[\]\\]/g, "\\$&"));
+  return {
+    key,
+    pattern: new RegExp(`^${literal.join("([^;]+?)")}$`),
+    names: [...key.matchAll(BLANK)].map((found) => found[1]),
+    weight: literal.join("").length, // what says most of itself fits best
+  };
+}
+
+function whole(text) {
+  for (const { key, pattern, names } of sentences) {
+    const found = pattern.exec(text);
+    if (found) return say(key, Object.fromEntries(names.map((name, i) => [name, filled(found[i + 1]) ?? found[i + 1]])));
+  }
+  return null;
+}
+
+/** What stands in a blank: a segment, a side, a figure, another sentence, or some of them; null if none. */
+function filled(value) {
+  return joined(value, ", ", filled) ?? joined(value, " and ", filled) ?? one(value);
+}
+
+function one(value) {
+  for (const kind of ["segment", "side"]) if (has(`${kind}.${value}`)) return say(`${kind}.${value}`);
+  if (/^-?\d+\.\d+$/.test(value)) return number(Number(value), value.split(".")[1].length);
+  return whole(value);
+}
+
+/** Text that is known up to a mark, as far as can be, and whatever follows; null where none is. */
+function joined(text, mark, rest) {
+  for (let at = text.lastIndexOf(mark); at > 0; at = text.lastIndexOf(mark, at - 1)) {
+    const left = one(text.slice(0, at));
+    const right = left === null ? null : rest(text.slice(at + mark.length));
+    if (right !== null) return left + (mark === "; " ? mark : ", ") + right;
+  }
+  return null;
+}
+
+/** The text with its segments called as people call them. */
+function named(text) {
+  return text.replace(/\b(sternum|(upper_arm|forearm|hand)_[rl])\b/g, (id) => say(`segment.${id}`));
 }
 
 /** True when the catalogue has this key. */
