@@ -121,6 +121,8 @@ def test_the_version_is_the_distributions(brachium):
 
 BAD_INPUT = {
     "all interfaces": (["router", "--bind", "0.0.0.0"], "every interface"),
+    "pages everywhere": (["web", "--bind", "0.0.0.0"], "one interface"),
+    "pages nowhere": (["web", "--bind", "nonsense"], "'nonsense' is no address"),
     "no such interface": (["slimevr", "--bind", "nohost"], "'nohost' is no address"),
     "port outside": (["router", "--port", "99999"], "65535"),
     "no such input": (["solve", "nothing.mcap"], "nothing.mcap"),
@@ -192,6 +194,7 @@ def test_a_number_out_of_range_is_usage(
     "words",
     [
         ["record", "--out"],
+        ["web", "--sessions"],
         ["demo", "--out"],
         ["firmware", "--out"],
         ["sensor", "x", "--out"],
@@ -207,6 +210,14 @@ def test_a_file_where_a_folder_goes_is_named(
     with pytest.raises(SystemExit, match="2"):
         main([*words, str(tmp_path / "afile" / inside)])
     assert f"{tmp_path / 'afile'} is a file, and a folder goes there" in capsys.readouterr().err
+
+
+def test_pages_do_not_start_over_a_store_that_can_keep_nothing(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+):
+    (tmp_path / "sessions.sqlite").write_text("no database" * 100)
+    assert main(["web", "--sessions", str(tmp_path)]) == 2
+    assert "no store of sessions" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("case", BAD_INPUT)

@@ -1,6 +1,6 @@
 """Serve the therapist's and the patient's page to browsers: on this machine, or with --bind on one network.
 
-Each screen enters a pairing code once, or the password in $BRACHIUM_WEB_PASSWORD.
+Each screen enters a pairing code once, which is printed here, or the password in $BRACHIUM_WEB_PASSWORD.
 
 brachium web --sessions sessions
   brachium web --bind 192.168.1.20 --port 8080
@@ -10,7 +10,7 @@ import argparse
 import os
 from pathlib import Path
 
-from brachium.option_types import port_or_any
+from brachium.option_types import folder, port_or_any
 from brachium.shell import add_network, serve
 
 PASSWORD_VARIABLE = "BRACHIUM_WEB_PASSWORD"
@@ -24,21 +24,28 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--port", type=port_or_any, default=8080, help="0 takes any free one")
     parser.add_argument("--subject", help="who is shown first (default: the first that is heard of)")
     parser.add_argument(
-        "--sessions", type=Path, default=Path("sessions"), metavar="DIR", help="recordings and results"
+        "--sessions", type=folder, default=Path("sessions"), metavar="DIR", help="recordings and results"
     )
     parser.add_argument(
-        "--no-password", action="store_true", help="nobody is asked for anything; only on this machine"
+        "--no-password",
+        action="store_true",
+        help="nobody is asked for anything; only on this machine (default: a pairing code is printed, or "
+        f"${PASSWORD_VARIABLE} holds the password)",
     )
 
 
 def run(args: argparse.Namespace) -> int:
     """Start the server."""
+    from brachium_nodes.listening import listening_address
+    from brachium_viewer.sessions.store import Store
     from brachium_viewer.web import server
 
+    bind = listening_address("127.0.0.1" if args.bind == "localhost" else args.bind)
+    Store.open(args.sessions).close()  # refused now, and not when a session is to be kept
     settings = server.WebSettings(
         endpoint=args.endpoint,
         room=args.room,
-        bind=args.bind,
+        bind=bind,
         port=args.port,
         subject=args.subject,
         sessions=args.sessions,

@@ -75,6 +75,15 @@ def _newer(manifest: dict[str, Any], _: dict[str, bytes]) -> None:
     manifest["version"] += 1
 
 
+def _too_late(manifest: dict[str, Any], _: dict[str, bytes]) -> None:
+    manifest["sessions"][0]["started_ns"] = 2**70
+
+
+def _worse_than_worst(manifest: dict[str, Any], _: dict[str, bytes]) -> None:
+    rating = {"kind": "pain", "when": "after", "value": 11, "time_ns": 1}
+    manifest["sessions"][0]["ratings"] = [rating]
+
+
 HOSTILE: dict[str, tuple[Callable[[dict[str, Any], dict[str, bytes]], None], str]] = {
     "up and out": (lambda m, e: _name(m, e, "../a.mcap"), "cannot be used"),
     "absolute": (lambda m, e: _name(m, e, "/etc/a.mcap"), "cannot be used"),
@@ -85,6 +94,8 @@ HOSTILE: dict[str, tuple[Callable[[dict[str, Any], dict[str, bytes]], None], str
     "another person": (_other_person, "session of p09"),
     "one file more": (_more, "or others"),
     "a newer one": (_newer, "newer Brachium"),
+    "a year that no file holds": (_too_late, "a number that cannot be"),
+    "more pain than there is": (_worse_than_worst, "a number that cannot be"),
 }
 
 

@@ -104,6 +104,35 @@ def test_a_recording_that_is_being_written_is_not_deleted(tmp_path: Path, script
         assert store.subject("p01") is not None
 
 
+def test_a_deletion_leaves_another_recording_whose_name_begins_alike(
+    tmp_path: Path, script: Any, write_session: Any
+) -> None:
+    one, other = script("p01"), script("p02")
+    for who in (one, other):
+        who.set(2, 90.0)
+    with Store.open(tmp_path) as store:
+        add(tmp_path, store, [one], write_session)
+        write_session(tmp_path / "a.b.mcap", [other])
+        store.add(session_from_recording(tmp_path / "a.b.mcap"))
+        store.delete("p01")
+        assert {path.name for path in tmp_path.glob("*.mcap")} == {"a.b.mcap"}
+
+
+def test_a_store_that_cannot_be_written_is_not_called_none(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refused(*_: object, **__: object) -> None:
+        raise sqlite3.OperationalError("attempt to write a readonly database")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(schema, "_settle", refused)
+        with pytest.raises(StoreError, match="cannot be opened for writing"):
+            Store.open(tmp_path)
+    (tmp_path / "taken" / schema.FILE).mkdir(parents=True)
+    with pytest.raises(StoreError, match="cannot be opened for writing"):
+        Store.open(tmp_path / "taken")
+
+
 def test_a_newer_or_a_foreign_file_is_refused(tmp_path: Path) -> None:
     Store.open(tmp_path / "newer").close()
     with sqlite3.connect(tmp_path / "newer" / schema.FILE) as db:

@@ -48,8 +48,12 @@ def of_subject(folder: Path, subject: str) -> list[tuple[Path, bool]]:
 
 
 def beside(path: Path) -> list[Path]:
-    """Return what was made of a recording and lies beside it: its name, with another ending."""
-    return sorted(other for other in path.parent.glob(f"{path.stem}.*") if other != path and other.is_file())
+    """Return what was made of a recording and lies beside it: its name, with another ending.
+
+    Another recording is none of it, whatever its name begins with.
+    """
+    made = (other for other in path.parent.glob(f"{path.stem}.*") if other.suffix != path.suffix)
+    return sorted(other for other in made if other.is_file())
 
 
 def copy_of(source: Path, target: Path, subject: str, *, without: bool) -> None:

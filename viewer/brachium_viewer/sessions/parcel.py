@@ -6,6 +6,7 @@ are not.
 """
 
 import hashlib
+import sqlite3
 import zipfile
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -87,14 +88,28 @@ def unpack(store: Store, source: Path) -> Manifest:
             for session in manifest.sessions:
                 if session.recording:
                     _check_recording(Path(scratch) / session.recording, session)
-            store.put_subject(manifest.subject)
-            for one in manifest.files:
-                (Path(scratch) / one.name).rename(store.folder / one.name)
-            for session in manifest.sessions:
-                store.add(session)
+            _take_in(store, manifest, Path(scratch))
     except (zipfile.BadZipFile, RuntimeError, EOFError) as error:  # RuntimeError: encrypted, or unknown
         raise StoreError(f"{source}: no zip that can be read ({error})") from None
     return manifest
+
+
+def _take_in(store: Store, manifest: Manifest, scratch: Path) -> None:
+    """Put what was checked into the store and its recordings beside it: all, or nothing."""
+    moved: list[Path] = []
+    try:
+        with store.together():
+            store.put_subject(manifest.subject)
+            for one in manifest.files:
+                moved.append((scratch / one.name).rename(store.folder / one.name))
+            for session in manifest.sessions:
+                store.add(session)
+    except BaseException as error:
+        for path in moved:
+            path.unlink(missing_ok=True)
+        if isinstance(error, OverflowError | sqlite3.IntegrityError):
+            raise StoreError(f"{MANIFEST} holds a number that cannot be: {error}") from None
+        raise
 
 
 def _manifest(archive: zipfile.ZipFile, source: Path) -> Manifest:

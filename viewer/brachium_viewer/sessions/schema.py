@@ -61,10 +61,13 @@ whoever opens the store next."""
 def connect(folder: Path) -> sqlite3.Connection:
     """Open the folder's file, making its tables when it is new.
 
-    Raises StoreError for a file that is not a store, or one of a newer Brachium.
+    Raises StoreError for a file that is not a store or cannot be written, or one of a newer Brachium.
     """
     path = folder / FILE
-    connection = sqlite3.connect(path, timeout=BUSY_S, isolation_level=None, check_same_thread=False)
+    try:
+        connection = sqlite3.connect(path, timeout=BUSY_S, isolation_level=None, check_same_thread=False)
+    except sqlite3.OperationalError as error:
+        raise StoreError(_not_open(path, error)) from None
     try:
         connection.row_factory = sqlite3.Row
         connection.execute("PRAGMA journal_mode = WAL")
@@ -72,6 +75,9 @@ def connect(folder: Path) -> sqlite3.Connection:
         connection.execute("PRAGMA foreign_keys = ON")
         connection.execute("PRAGMA secure_delete = ON")  # what is deleted is overwritten
         _settle(connection, path)
+    except sqlite3.OperationalError as error:  # it may well be one: locked, not to be written, a broken disk
+        connection.close()
+        raise StoreError(_not_open(path, error)) from None
     except sqlite3.DatabaseError as error:
         connection.close()
         raise StoreError(f"{path}: no store of sessions ({error}); choose another folder") from None
@@ -79,6 +85,12 @@ def connect(folder: Path) -> sqlite3.Connection:
         connection.close()
         raise
     return connection
+
+
+def _not_open(path: Path, error: sqlite3.OperationalError) -> str:
+    return (
+        f"{path}: cannot be opened for writing ({error}); give it back its rights, or choose another folder"
+    )
 
 
 def _settle(connection: sqlite3.Connection, path: Path) -> None:

@@ -62,7 +62,7 @@ class Store:
     def put_subject(self, subject: Subject) -> None:
         """Keep a person, or change what is kept. Raises keys.BadKey for what cannot be a pseudonym."""
         keys.subject_chunk(subject.pseudonym)
-        with self._writing() as db:
+        with self.together() as db:
             _refuse_deleting(db, subject.pseudonym)
             db.execute(
                 "INSERT INTO subject VALUES (?, ?, ?, ?, ?) ON CONFLICT (pseudonym) DO UPDATE SET "
@@ -86,7 +86,7 @@ class Store:
         keys.subject_chunk(session.subject)
         if session.recording and not self.recording(session).is_file():
             raise StoreError(f"{session.recording}: not in {self.folder}; a session's recording lies there")
-        with self._writing() as db:
+        with self.together() as db:
             _refuse_deleting(db, session.subject)
             db.execute(
                 "INSERT OR IGNORE INTO subject VALUES (?, '', '', '{}', '')",
@@ -152,12 +152,12 @@ class Store:
         if not known:
             raise StoreError(f"there is no subject {subject!r} in {self.folder}")
         files.check_free(self.folder, subject)
-        with self._writing() as db:
+        with self.together() as db:
             db.execute("INSERT OR IGNORE INTO deleting VALUES (?)", (subject,))
         self._finish_deleting(subject)
 
     def _finish_deleting(self, subject: str) -> None:
-        with self._writing() as db:
+        with self.together() as db:
             # A second process that came for the same waits above, and finds nothing left to do.
             files.remove(self.folder, subject)
             db.execute("DELETE FROM subject WHERE pseudonym = ?", (subject,))
@@ -189,9 +189,12 @@ class Store:
             return self._connection.execute(question, values).fetchall()
 
     @contextmanager
-    def _writing(self) -> Iterator[sqlite3.Connection]:
-        """One transaction: all of it or nothing."""
+    def together(self) -> Iterator[sqlite3.Connection]:
+        """One transaction: what is written inside is kept whole or not at all."""
         with self._lock:
+            if self._connection.in_transaction:
+                yield self._connection
+                return
             self._connection.execute("BEGIN IMMEDIATE")
             try:
                 yield self._connection
