@@ -14,6 +14,7 @@ from brachium_wire.table import MissingExtra
 Floats = npt.NDArray[np.float64]
 
 INK, QUIET, MEASURED, TRUE, SHADE = "#1d2733", "#6b7785", "#0b5cad", "#f0b35f", "#eef1f4"
+FRAME, GRID = "#c3cad2", "#e6eaee"
 POINTS = 900
 """Points of a line at most: more than its pixels are of no use in print."""
 
@@ -35,9 +36,9 @@ def plain(axes: Any) -> None:
     for side in ("top", "right"):
         axes.spines[side].set_visible(False)
     for side in ("left", "bottom"):
-        axes.spines[side].set_color("#c3cad2")
+        axes.spines[side].set_color(FRAME)
     axes.tick_params(colors=QUIET, labelsize=7.5, length=2.5, width=0.6)
-    axes.grid(axis="y", color="#e6eaee", linewidth=0.6)
+    axes.grid(axis="y", color=GRID, linewidth=0.6)
     axes.set_axisbelow(True)
 
 

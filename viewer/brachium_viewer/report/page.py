@@ -8,6 +8,7 @@ from typing import Any
 from brachium_body.segments import Side
 from brachium_viewer import contents as c
 from brachium_viewer import figures as f
+from brachium_viewer.catalogue import ENGLISH
 from brachium_viewer.marks import ExerciseBegins
 from brachium_viewer.page_sections import Chart
 from brachium_viewer.page_template import origin_words, render
@@ -23,6 +24,7 @@ from brachium_viewer.report.build import (
     range_bars,
 )
 from brachium_viewer.report.groups import lags, symmetries
+from brachium_viewer.report.language import in_language
 from brachium_viewer.sessions import from_recording as sessions
 from brachium_viewer.sessions.store import Store
 
@@ -41,6 +43,8 @@ class ReportSettings:
     subject: str | None = None
     without_marks: ExerciseBegins | None = None
     """What was done, where nobody marked it."""
+    language: str = ENGLISH
+    """Of the page; one of LANGUAGES."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -82,7 +86,7 @@ def write(settings: ReportSettings) -> ReportFigures:
             ),
             known.affected_side if known is not None else "",
         )
-    text = page(report)
+    text = in_language(page(report), settings.language)
     settings.out.write_text(text, encoding="utf-8")
     if settings.csv is not None:
         tidy.write(settings.csv, session, report.zero_ns)

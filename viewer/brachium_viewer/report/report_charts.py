@@ -5,9 +5,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
-from brachium_viewer.charts import INK, QUIET, new_figure, plain, svg
+from brachium_viewer.charts import GRID, INK, QUIET, new_figure, plain, svg
 from brachium_viewer.metrics.arm_motion import Floats
+from brachium_viewer.report.panels import TEXT, Panel, Sheet, apart, reach, round_numbers
 from brachium_viewer.report.repetition_lines import SHARES
 
 MODE_COLOURS = {"active": "#0b5cad", "assisted": "#117a65", "passive": "#c2570c"}
@@ -17,7 +19,6 @@ VIEWS = (("from the front", 0, 2), ("from the side", 1, 2), ("from above", 0, 1)
 """Trunk axes: x to the right, y forward, z up."""
 AXIS_NAMES = ("right", "forward", "up")
 WIDTH_IN, HEIGHT_IN = 7.3, 1.5
-TEXT = 6.8
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -38,48 +39,40 @@ class MovementLines:
 
 def movement(name: str, lines: MovementLines) -> str:
     """Return one row: the angle over each repetition, paths in three views, and x, y, z over time."""
-    figure = new_figure(WIDTH_IN, HEIGHT_IN, constrained=False)
-    _overlay(_place(figure, 0.42, 0.34, 1.62, 1.0), lines)
+    sheet = Sheet(WIDTH_IN, HEIGHT_IN)
+    _overlay(sheet, lines)
     if any(np.isfinite(p).any() for p in lines.paths.values()):
         lowest, size = _cube(lines.paths)
-        for i, (_, across, upward) in enumerate(VIEWS):
-            axes = _place(figure, 2.45 + 1.07 * i, 0.34, 0.82, 0.82)
-            _view(axes, lines, across, upward, lowest, size, i)
-        _legend(figure, lines)
-        _over_time(figure, lines)
-    return svg(figure, name)
+        for number in range(len(VIEWS)):
+            _view(sheet, lines, lowest, size, number)
+        for i, joint in enumerate(lines.paths):
+            sheet.text(2.46 + 0.5 * i, 1.43, joint, JOINT_COLOURS[joint], weight="bold", va="center")
+        _over_time(sheet, lines)
+    return sheet.svg(name)
 
 
-def _place(figure: Any, left_in: float, bottom_in: float, width_in: float, height_in: float) -> Any:
-    axes = figure.add_axes(
-        (left_in / WIDTH_IN, bottom_in / HEIGHT_IN, width_in / WIDTH_IN, height_in / HEIGHT_IN)
-    )
-    plain(axes)
-    axes.tick_params(labelsize=TEXT - 0.6, pad=1.5)
-    return axes
-
-
-def _overlay(axes: Any, lines: MovementLines) -> None:
+def _overlay(sheet: Sheet, lines: MovementLines) -> None:
+    goal = np.array([] if lines.goal_deg is None else [lines.goal_deg])
+    spans = reach([*lines.overlays.values(), goal])
+    panel = Panel(sheet=sheet, corner_in=(0.42, 0.34), size_in=(1.62, 1.0), x=(0.0, 100.0), y=spans)
     for mode, rows in lines.overlays.items():
         colour = MODE_COLOURS.get(mode, INK)
-        axes.plot(
-            _apart(np.tile(SHARES, (len(rows), 1))), _apart(rows), color=colour, linewidth=0.5, alpha=0.4
-        )
         if np.isfinite(rows).any():
-            axes.plot(SHARES, _middle(rows), color=colour, linewidth=1.5)
+            panel.line(apart([_points(SHARES, row) for row in rows]), colour, 0.5, alpha=0.4)
+            panel.line(_points(SHARES, _middle(rows)), colour, 1.5)
     if lines.goal_deg is not None:
-        axes.axhline(lines.goal_deg, color=INK, linewidth=0.7, linestyle=(0, (4, 3)))
-        axes.text(99, lines.goal_deg, "goal", fontsize=TEXT - 0.8, color=INK, va="bottom", ha="right")
-    axes.set_xlim(0, 100)
-    axes.set_xticks([0, 50, 100])
-    axes.set_xlabel("% of the repetition", fontsize=TEXT, color=QUIET, labelpad=1)
-    axes.set_ylabel("deg", fontsize=TEXT, color=QUIET, labelpad=1)
-    axes.set_title(lines.angle, fontsize=TEXT + 0.4, color=INK, loc="left", pad=3)
+        panel.line(_points(panel.x, goal.repeat(2)), INK, 0.7, linestyle=(0, (4, 3)))
+        x_in, y_in = panel.at(np.array([99.0, lines.goal_deg])).tolist()
+        sheet.text(x_in, y_in, "goal", fontsize=TEXT - 0.8, va="bottom", ha="right")
+    ticks = round_numbers(spans, 5)
+    panel.frame((0.0, 50.0, 100.0), ticks)
+    panel.name_x("% of the repetition")
+    panel.name_y("deg", ticks)
+    panel.title(lines.angle)
 
 
-def _apart(rows: Floats) -> Floats:
-    """Return rows (n, m) as one line that is broken between them: one path is a tenth of the page of many."""
-    return np.concatenate([rows, np.full((len(rows), 1), np.nan)], axis=1).ravel()
+def _points(x: npt.ArrayLike, y: Floats) -> Floats:
+    return np.stack([np.asarray(x, dtype=np.float64), y], axis=-1)
 
 
 def _middle(rows: Floats) -> Floats:
@@ -98,51 +91,35 @@ def _cube(paths: Mapping[str, Floats]) -> tuple[Floats, float]:
     return np.asarray(0.5 * (low + high) - 0.5 * size), size
 
 
-def _view(
-    axes: Any, lines: MovementLines, across: int, upward: int, lowest: Floats, size: float, number: int
-) -> None:
+def _view(sheet: Sheet, lines: MovementLines, lowest: Floats, size: float, number: int) -> None:
+    title, across, upward = VIEWS[number]
+    x, y = ((float(lowest[i]), float(lowest[i]) + size) for i in (across, upward))
+    corner_in = 2.45 + 1.07 * number, 0.34
+    panel = Panel(sheet=sheet, corner_in=corner_in, size_in=(0.76, 0.76), x=x, y=y)
     for joint, rows in lines.paths.items():
-        places = _apart(rows[:, :, across]), _apart(rows[:, :, upward])
-        axes.plot(*places, color=JOINT_COLOURS[joint], linewidth=0.6, alpha=0.6)
-    axes.set_xlim(lowest[across], lowest[across] + size)
-    axes.set_ylim(lowest[upward], lowest[upward] + size)
-    axes.grid(visible=False)
-    for ticks in (axes.xaxis, axes.yaxis):
-        ticks.set_major_locator(_few())
-    axes.set_xlabel(f"{AXIS_NAMES[across]}, cm", fontsize=TEXT, color=QUIET, labelpad=1)
-    axes.set_ylabel(AXIS_NAMES[upward], fontsize=TEXT, color=QUIET, labelpad=0)
-    axes.set_title(VIEWS[number][0], fontsize=TEXT + 0.4, color=INK, loc="left", pad=3)
+        panel.line(apart(list(rows[:, :, [across, upward]])), JOINT_COLOURS[joint], 0.6, alpha=0.6)
+    ticks = round_numbers(y, 3)
+    panel.frame(round_numbers(x, 3), ticks, grid=False)
+    panel.name_x(f"{AXIS_NAMES[across]}, cm")
+    panel.name_y(AXIS_NAMES[upward], ticks)
+    panel.title(title)
 
 
-def _few() -> Any:
-    from matplotlib.ticker import MaxNLocator
-
-    return MaxNLocator(3, integer=True)
-
-
-def _legend(figure: Any, lines: MovementLines) -> None:
-    for i, joint in enumerate(lines.paths):
-        left, level = (2.46 + 0.5 * i) / WIDTH_IN, 1.43 / HEIGHT_IN
-        figure.text(left, level, joint, fontsize=TEXT, color=JOINT_COLOURS[joint], weight="bold", va="center")
-
-
-def _over_time(figure: Any, lines: MovementLines) -> None:
+def _over_time(sheet: Sheet, lines: MovementLines) -> None:
     """Draw right, forward and up, one above the other."""
+    x = 0.0, max(float(lines.time_s[-1]), 1e-3)
     for i, name in enumerate(AXIS_NAMES):
-        axes = _place(figure, 5.72, 0.34 + 0.36 * (2 - i), 1.36, 0.29)
+        y = reach(place[:, i] for place in lines.places.values())
+        corner_in, size_in = (5.72, 0.34 + 0.36 * (2 - i)), (1.36, 0.29)
+        panel = Panel(sheet=sheet, corner_in=corner_in, size_in=size_in, x=x, y=y)
         for joint, place in lines.places.items():
-            axes.plot(lines.time_s, place[:, i], color=JOINT_COLOURS[joint], linewidth=0.8)
-        axes.yaxis.set_major_locator(_few())
-        axes.set_xlim(0.0, max(float(lines.time_s[-1]), 1e-3))
-        axes.text(1.01, 0.5, name, transform=axes.transAxes, rotation=270, fontsize=TEXT - 1.2, color=QUIET,
-                  va="center", ha="left", clip_on=False)  # fmt: skip
-        if i < 2:
-            axes.tick_params(labelbottom=False)
-        else:
-            axes.set_xlabel("s, of one set", fontsize=TEXT, color=QUIET, labelpad=1)
-    figure.text(
-        5.72 / WIDTH_IN, 1.43 / HEIGHT_IN, "over time, cm", fontsize=TEXT + 0.4, color=INK, va="center"
-    )
+            panel.line(_points(lines.time_s, place[:, i]), JOINT_COLOURS[joint], 0.8)
+        panel.frame(round_numbers(x, 3), round_numbers(y, 3), numbers=i == 2)
+        sheet.text(corner_in[0] + 1.01 * size_in[0], corner_in[1] + 0.5 * size_in[1], name, QUIET,
+                   rotation=270, fontsize=TEXT - 1.2, va="center", ha="left")  # fmt: skip
+        if i == 2:
+            panel.name_x("s, of one set")
+    sheet.text(5.72, 1.43, "over time, cm", fontsize=TEXT + 0.4, va="center")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -171,7 +148,7 @@ def ranges(name: str, bars: Sequence[RangeBar]) -> str:
     axes = figure.add_subplot()
     plain(axes)
     axes.grid(visible=False)
-    axes.grid(axis="x", color="#e6eaee", linewidth=0.6)
+    axes.grid(axis="x", color=GRID, linewidth=0.6)
     for i, bar in enumerate(bars):
         y = len(bars) - 1 - i
         if bar.reference is not None:

@@ -35,7 +35,7 @@ def how_zero_was_set(report: Report) -> str:
         return f"The recording holds no calibration. Forward: {facing or words.FORWARD['none']}."
     pose = f"in pose {found.pose}" if found.pose else "from stated mountings"
     scores = ", ".join(f"{name.replace('_', ' ')} {value:.3g}" for name, value in found.scores.items())
-    return f"Zero {pose}. Forward {facing}." + (f" Scores: {scores}." if scores else "")
+    return f"Zero {pose}. Forward {facing}." + (f" Scores of the calibration: {scores}." if scores else "")
 
 
 def warnings(report: Report) -> list[str]:
@@ -79,7 +79,7 @@ def method(report: Report) -> list[str]:
     settings = ", ".join(f"{name} {value}" for name, value in fusion.items() if _plain(value))
     return [
         f"Measures by method {report.session.method}, Brachium {_version()}."
-        + (f" Fusion: {settings}." if settings else ""),
+        + (f" Settings of fusion: {settings}." if settings else ""),
         f"SPARC up to {CUTOFF_HZ:.0f} Hz of the way there; LDLJ of its speed at {LDLJ_RATE_HZ:.0f} Hz; both "
         "are smoother closer to 0.",
         f"Elevation of the arm counts for an exercise in this band of its plane, deg: {bands}. Shoulder "
