@@ -2,6 +2,7 @@
 
 import logging
 import struct
+import zlib
 from collections.abc import Generator, Iterator
 from io import BufferedReader, BytesIO
 from pathlib import Path
@@ -49,6 +50,7 @@ class Reading:
         """Whether the file's proper end was reached."""
         self._channels: dict[int, str] = {}
         self._bad_chunks = self._unnamed = 0
+        self._unpacker = zstandard.ZstdDecompressor()
         self._size = path.stat().st_size
         self._file = path.open("rb")
         try:
@@ -110,7 +112,7 @@ class Reading:
 
     def _unpack(self, content: bytes) -> Iterator[Recorded]:
         try:
-            channels, messages = _in_chunk(Chunk.read(_stream(content)))
+            channels, messages = _in_chunk(_data(Chunk.read(_stream(content)), self._unpacker))
         except DAMAGE:
             self._bad_chunks += 1
             return
@@ -157,14 +159,27 @@ def _stream(content: bytes) -> ReadDataStream:
     return ReadDataStream(BytesIO(content))
 
 
-def _in_chunk(chunk: Chunk) -> tuple[dict[int, str], list[tuple[int, int, bytes]]]:
+def _data(chunk: Chunk, unpacker: zstandard.ZstdDecompressor) -> bytes:
+    """Return what a chunk holds, unpacked. Raises one of DAMAGE.
+
+    As mcap's own way does it, but for one unpacker for all: there is a chunk each fifth of a second.
+    """
+    if chunk.compression != "zstd":
+        stream, size = get_chunk_data_stream(chunk, validate_crc=True)
+        return bytes(stream.read(size))
+    data = unpacker.decompress(chunk.data, chunk.uncompressed_size)
+    if chunk.uncompressed_crc not in (0, zlib.crc32(data)):
+        raise ValueError("a block's check sum is another")
+    return data
+
+
+def _in_chunk(data: bytes) -> tuple[dict[int, str], list[tuple[int, int, bytes]]]:
     """Return a chunk's channels, number to key, and its messages: channel, log time in ns, bytes.
 
     Ten times as fast as mcap's own way, which makes an object of every field: a session is 100 000 messages.
     Raises one of DAMAGE.
     """
-    stream, size = get_chunk_data_stream(chunk, validate_crc=True)
-    data, at = stream.read(size), 0
+    at, size = 0, len(data)
     channels: dict[int, str] = {}
     messages: list[tuple[int, int, bytes]] = []
     while at < size:
