@@ -20,12 +20,14 @@ def configure(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--subject", help="which subject of the recording; needed where there are several")
     parser.add_argument("--exercise", help="what was done, in a recording without marks")
+    parser.add_argument("--language", default="en", metavar="CODE", help="of the page: en (default) or de")
     parser.add_argument("--side", choices=("right", "left"), help="by which arm, in one without marks")
     add_json(parser)
 
 
 def run(args: argparse.Namespace) -> int:
     """Write the page, and say what it holds."""
+    from brachium_viewer.catalogue import LANGUAGES
     from brachium_viewer.exercises import EXERCISES
     from brachium_viewer.marks import ExerciseBegins
     from brachium_viewer.report import page
@@ -34,6 +36,8 @@ def run(args: argparse.Namespace) -> int:
         raise Usage("--exercise and --side go together")
     if args.exercise is not None and args.exercise not in EXERCISES:
         raise Usage(f"--exercise {args.exercise!r} is not known; choose of {', '.join(EXERCISES)}")
+    if args.language not in LANGUAGES:
+        raise Usage(f"--language {args.language!r} is not there; choose of {', '.join(LANGUAGES)}")
     check_writable(args.out, (".html",), "--out")
     if args.csv is not None:
         check_writable(args.csv, (".csv", ".parquet"), "--csv")
@@ -48,6 +52,7 @@ def run(args: argparse.Namespace) -> int:
             sessions=args.sessions,
             subject=args.subject,
             without_marks=begins,
+            language=args.language,
         )
     )
     if args.json:

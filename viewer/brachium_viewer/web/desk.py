@@ -6,6 +6,7 @@ from contextlib import suppress
 from typing import Any
 
 from brachium_viewer import marks
+from brachium_viewer.exercises import exercise
 from brachium_viewer.web import requests as r
 from brachium_viewer.web.page_state import PageState
 from brachium_viewer.web.session_desk import NoRecording, SessionDesk
@@ -77,7 +78,7 @@ class Desk:
                     await self._mark(subject, marks.PatientStop(reason=asked.reason))
                 return ended
             case r.Report():
-                return await self._finish(subject)
+                return await self._finish(subject, asked.language)
             case r.Mark():
                 return await self._mark(subject, marks.Note(), asked.text)
             case r.Donning():
@@ -127,6 +128,8 @@ class Desk:
             raise Refused(f"no skeletons of the {asked.side} arm come: are its sensors on?")
         if self._state.running is not None:
             raise Refused("a set is running: stop it first")
+        if _leads_beyond(asked):
+            raise Refused("the goal lies beyond the limit: change one of them")
         begins = marks.ExerciseBegins(
             exercise=asked.exercise,
             side=asked.side,
@@ -154,11 +157,11 @@ class Desk:
         ended = self._state.end()
         return {"set": ended}
 
-    async def _finish(self, subject: str) -> Json:
+    async def _finish(self, subject: str, language: str) -> Json:
         if self._state.running is not None:
             await self._end(subject, "stopped")
         await asyncio.sleep(HEARD_S)  # what was said last is still on its way to the recording
-        return await self._sessions.finish(subject)
+        return await self._sessions.finish(subject, language)
 
     async def _mark(self, subject: str, mark: marks.Mark, text: str = "") -> Json:
         await self._sessions.begin(self._bus, subject)
@@ -181,6 +184,14 @@ class Desk:
             return decode(reply, Answer)
         except WireError as error:
             raise Refused(f"the answer cannot be read: {error}") from None
+
+
+def _leads_beyond(asked: r.Exercise) -> bool:
+    """Return whether who follows the goal would pass the limit."""
+    if asked.goal_deg is None or asked.limit_deg is None:
+        return False
+    rises = exercise(asked.exercise).rises
+    return asked.goal_deg > asked.limit_deg if rises else asked.goal_deg < asked.limit_deg
 
 
 def _answer(number: int, verb: str, *, data: Json | None = None, reason: str = "") -> Json:

@@ -9,6 +9,7 @@ from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 from typing import Any, ParamSpec, TypeVar
 
+from brachium_viewer.catalogue import ENGLISH, LANGUAGES
 from brachium_viewer.sessions.from_recording import session_from_recording
 from brachium_viewer.sessions.records import SessionRecord
 from brachium_viewer.sessions.store import Store
@@ -29,7 +30,7 @@ def apart(function: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
         return pool.submit(function, *args, **kwargs).result()
 
 
-def keep(recording: Path, subject: str) -> Json:
+def keep(recording: Path, subject: str, language: str = ENGLISH) -> Json:
     """Put the session of a recording into the store of its folder, and write its report beside it.
 
     Returns the report's address; without one, why there is none.
@@ -41,7 +42,15 @@ def keep(recording: Path, subject: str) -> Json:
 
     page = report_page(recording)
     try:
-        report.write(report.ReportSettings(recording=recording, out=page, sessions=folder, subject=subject))
+        report.write(
+            report.ReportSettings(
+                recording=recording,
+                out=page,
+                sessions=folder,
+                subject=subject,
+                language=language if language in LANGUAGES else ENGLISH,
+            )
+        )
     except MissingExtra as error:
         return {"report": None, "why": str(error)}
     return {"report": report_link(page), "why": ""}

@@ -5,6 +5,7 @@ from typing import Annotated, Literal
 import msgspec
 
 from brachium_body.segments import Side
+from brachium_viewer.catalogue import ENGLISH
 from brachium_viewer.marks import Mode, When
 
 MAX_BYTES = 4096
@@ -104,6 +105,9 @@ class Subject(Request, frozen=True, kw_only=True, tag="subject"):
 
 class Report(Request, frozen=True, kw_only=True, tag="report"):
     """End the session: close its recording and make its report."""
+
+    language: Annotated[str, msgspec.Meta(max_length=8)] = ENGLISH
+    """Of the report; English where there are no words of it."""
 
 
 Any = (

@@ -63,7 +63,7 @@ class SessionDesk:
             if self._thread is None:
                 await asyncio.to_thread(self._start, bus, subject)
 
-    async def finish(self, subject: str) -> Json:
+    async def finish(self, subject: str, language: str) -> Json:
         """Close the recording, keep its session, make its report. Raises NoRecording when there was none."""
         if self._thread is None:
             raise NoRecording("nothing was recorded yet: start an exercise first")
@@ -72,7 +72,7 @@ class SessionDesk:
             raise NoRecording(self.failure or "the recording could not be closed")
         path = self._closed.path
         try:
-            kept = await asyncio.to_thread(keeping.apart, keeping.keep, path, subject)
+            kept = await asyncio.to_thread(keeping.apart, keeping.keep, path, subject, language)
         finally:
             self._history = None, []
         return {"recording": path.name, "subject": subject, "ended": self._closed.ended, **kept}
