@@ -69,7 +69,11 @@ class Stepper {
 export class Plan {
   /** `changed` is called whenever something else is chosen. */
   constructor(changed) {
-    this.changed = () => this.ready && changed();
+    this.changed = () => {
+      if (!this.ready) return;
+      this.within();
+      changed();
+    };
     this.steps = Object.fromEntries(STEPS.map((row) => [row.name, new Stepper(row, () => this.changed())]));
     $("numbers").replaceChildren(...STEPS.map((row) => this.steps[row.name].field));
     $("modes").replaceChildren(...MODES.map((mode) => choice("mode", mode, `mode.${mode}`, mode === "active")));
@@ -99,6 +103,14 @@ export class Plan {
     this.steps.goal.value = row.goal_deg;
     this.names();
     this.changed();
+  }
+
+  /** A goal never leads beyond the limit. */
+  within() {
+    const { goal, limit } = this.steps;
+    if (goal.value === null || limit.value === null) return;
+    const beyond = this.exercise.rises ? goal.value > limit.value : goal.value < limit.value;
+    if (beyond) goal.input.value = limit.value;
   }
 
   get exercise() {
