@@ -6,7 +6,7 @@ import pytest
 from brachium_viewer.exercises import EXERCISES
 from brachium_viewer.metrics.arm_motion import ArmMotion
 from brachium_viewer.metrics.repetition_measures import NAMES, count, repetition_measures
-from brachium_viewer.metrics.set_measures import FEW, loss_between, set_measures, values
+from brachium_viewer.metrics.set_measures import FEW, loss_between, set_measures, together, values
 
 TIME = np.arange(0.0, 60.0, 0.02)
 
@@ -147,3 +147,17 @@ def test_the_shoulder_is_named_by_what_is_worn(motion_of) -> None:
     both = set_measures(motion_of(TIME, lean, shift=shift, with_sternum=True), EXERCISES["elbow-flexion"])
     assert both.shoulder_word == "shoulder"
     assert both.medians["trunk_lean"].value == pytest.approx(11.0, abs=1.5)
+
+
+@pytest.mark.parametrize(
+    ("quality", "said"), [("assumed", "assumption"), ("held", "lost"), ("good", "no rep")]
+)
+def test_a_set_without_repetitions_says_whether_its_angle_was_measured(
+    motion_of, quality: str, said: str
+) -> None:
+    still = motion_of(TIME, {"elbow_flexion": np.full(len(TIME), 30.0)})
+    still.quality["elbow_flexion"][:] = quality
+    found = set_measures(still, EXERCISES["elbow-flexion"])
+    for one in (found, together([found, found], EXERCISES["elbow-flexion"])):
+        assert said in one.medians["range"].withheld
+        assert said in one.best_peak.withheld

@@ -8,7 +8,7 @@ import numpy as np
 from brachium_viewer.exercises import Exercise
 from brachium_viewer.metrics import kinematics
 from brachium_viewer.metrics.arm_motion import ArmMotion
-from brachium_viewer.metrics.measure import Measure, measure, withheld
+from brachium_viewer.metrics.measure import ENOUGH, Measure, measure, why_not, withheld
 from brachium_viewer.metrics.repetition_measures import (
     NAMES,
     RepetitionMeasures,
@@ -56,6 +56,7 @@ def set_measures(
     """Return the measures of a set; the motion is of the set alone."""
     done = count(motion, exercise)
     found = tuple(repetition_measures(motion, exercise, one, goal_deg) for one in done.repetitions)
+    none = _why_none(motion, exercise)
     return SetMeasures(
         exercise=exercise.name,
         side=motion.side,
@@ -65,8 +66,8 @@ def set_measures(
         to_s=float(motion.time_s[-1]) if len(motion.time_s) else 0.0,
         tries=len(done.tries),
         repetitions=found,
-        medians={name: _median(found, name) for name in NAMES},
-        best_peak=_best(found, rises=exercise.rises),
+        medians={name: _median(found, name, none) for name in NAMES},
+        best_peak=_best(found, rises=exercise.rises, none=none),
         first_to_last={name: _change(found, name) for name in NAMES},
         extension_deficit=_deficit(motion),
         shoulder_word="shoulder" if motion.with_sternum else "shoulder or trunk movement",
@@ -81,14 +82,15 @@ def together(sets: Sequence[SetMeasures], exercise: Exercise) -> SetMeasures:
     if len({(one.exercise, one.side, one.mode) for one in sets}) != 1:
         raise ValueError("sets of one exercise by one arm in one mode can be taken together")
     found = tuple(repetition for one in sets for repetition in one.repetitions)
+    none = next((one.best_peak.withheld for one in sets if not one.repetitions), "")
     deficits = [one.extension_deficit for one in sets if one.extension_deficit.value is not None]
     return replace(
         sets[0],
         to_s=sets[-1].to_s,
         tries=sum(one.tries for one in sets),
         repetitions=found,
-        medians={name: _median(found, name) for name in NAMES},
-        best_peak=_best(found, rises=exercise.rises),
+        medians={name: _median(found, name, none) for name in NAMES},
+        best_peak=_best(found, rises=exercise.rises, none=none),
         first_to_last={name: _change(found, name) for name in NAMES},
         extension_deficit=min(deficits, key=lambda one: one.value or 0.0, default=sets[0].extension_deficit),
     )
@@ -99,18 +101,25 @@ def values(found: tuple[RepetitionMeasures, ...], name: str) -> list[float]:
     return [m.value for one in found if (m := one.measures[name]).value is not None]
 
 
-def _median(found: tuple[RepetitionMeasures, ...], name: str) -> Measure:
+def _why_none(motion: ArmMotion, exercise: Exercise) -> str:
+    """Return why a set has no repetition: its angle was not measured, or nobody moved so."""
+    if len(motion.time_s) and float(motion.measured(exercise.angle).mean()) < ENOUGH:
+        return why_not(motion.quality[exercise.angle])
+    return "no repetition"
+
+
+def _median(found: tuple[RepetitionMeasures, ...], name: str, none: str) -> Measure:
     known = values(found, name)
     if not known:
         reasons = [one.measures[name].withheld for one in found]
-        return withheld(max(reasons, key=reasons.count) if reasons else "no repetition", NAMES[name])
+        return withheld(max(reasons, key=reasons.count) if reasons else none, NAMES[name])
     return measure(float(np.median(known)), NAMES[name])
 
 
-def _best(found: tuple[RepetitionMeasures, ...], *, rises: bool) -> Measure:
+def _best(found: tuple[RepetitionMeasures, ...], *, rises: bool, none: str) -> Measure:
     known = values(found, "peak")
     if not known:
-        return _median(found, "peak")
+        return _median(found, "peak", none)
     return measure(max(known) if rises else min(known), "deg")
 
 
