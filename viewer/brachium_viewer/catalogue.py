@@ -7,6 +7,7 @@ what a report says beside it. The pages' own reader of it is web/pages/app/words
 import json
 import re
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
@@ -116,6 +117,7 @@ def _pattern(key: str) -> re.Pattern[str]:
     return re.compile("(.+?)".join(map(re.escape, re.split(r"\{\w+\}", key))))
 
 
+@cache
 def catalogue(language: str) -> Catalogue:
     """Return the words of a report's language but English. Raises ValueError for one that is not there."""
     if language not in LANGUAGES[1:]:

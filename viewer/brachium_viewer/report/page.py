@@ -1,7 +1,7 @@
 """`brachium report`: a recording to one page of HTML, and to a table. The shell: it touches files."""
 
 from contextlib import closing, nullcontext
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -24,7 +24,7 @@ from brachium_viewer.report.build import (
     range_bars,
 )
 from brachium_viewer.report.groups import lags, symmetries
-from brachium_viewer.report.language import in_language
+from brachium_viewer.report.language import in_language, speaker
 from brachium_viewer.sessions import from_recording as sessions
 from brachium_viewer.sessions.store import Store
 
@@ -86,7 +86,7 @@ def write(settings: ReportSettings) -> ReportFigures:
             ),
             known.affected_side if known is not None else "",
         )
-    text = in_language(page(report), settings.language)
+    text = page(report, settings.language)
     settings.out.write_text(text, encoding="utf-8")
     if settings.csv is not None:
         tidy.write(settings.csv, session, report.zero_ns)
@@ -102,7 +102,7 @@ def write(settings: ReportSettings) -> ReportFigures:
     )
 
 
-def page(report: Report) -> str:
+def page(report: Report, language: str = ENGLISH) -> str:
     """Return the page's HTML: no script, nothing loaded from elsewhere."""
     session, groups = report.session, report.groups
     origin_title, origin_text = origin_words([session.origin])
@@ -123,7 +123,7 @@ def page(report: Report) -> str:
         "/".join(who): None if sensor.status is None else sensor.status.battery_level
         for who, sensor in report.contents.sensors.items()
     }
-    return render(
+    english = render(
         TEMPLATE,
         session=session,
         date=tables.date(session.started_ns),
@@ -135,7 +135,7 @@ def page(report: Report) -> str:
         warnings=sentences.warnings(report),
         done=tables.done(groups) if groups else None,
         ratings=tables.ratings(session.ratings),
-        ranges=_ranges(report),
+        ranges=_ranges(report, language),
         comparison=tables.comparison(groups, report.pasts),
         why_no_comparison=sentences.why_no_comparison(report),
         movements=movement_charts(report),
@@ -146,6 +146,7 @@ def page(report: Report) -> str:
         method=sentences.method(report),
         disclaimer=words.DISCLAIMER,
     )
+    return in_language(english, language)
 
 
 def movement_charts(report: Report) -> list[Chart]:
@@ -164,6 +165,7 @@ def movement_charts(report: Report) -> list[Chart]:
     return drawn
 
 
-def _ranges(report: Report) -> str:
-    bars = range_bars(report)
+def _ranges(report: Report, language: str) -> str:
+    said = speaker(language)  # now: the drawing makes room for its labels
+    bars = [replace(bar, label=said(bar.label)) for bar in range_bars(report)]
     return report_charts.ranges("ranges", bars) if bars else ""

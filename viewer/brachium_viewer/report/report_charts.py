@@ -46,7 +46,7 @@ def movement(name: str, lines: MovementLines) -> str:
         for number in range(len(VIEWS)):
             _view(sheet, lines, lowest, size, number)
         for i, joint in enumerate(lines.paths):
-            sheet.text(2.46 + 0.5 * i, 1.43, joint, JOINT_COLOURS[joint], weight="bold", va="center")
+            sheet.text(2.46 + 0.72 * i, 1.43, joint, JOINT_COLOURS[joint], weight="bold", va="center")
         _over_time(sheet, lines)
     return sheet.svg(name)
 
