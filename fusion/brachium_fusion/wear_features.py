@@ -5,7 +5,6 @@ from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
-from scipy.signal import butter, sosfiltfilt
 
 from brachium_body import rotation
 
@@ -50,6 +49,8 @@ TURNED_RAD = 0.35
 
 def felt(record: WearRecord, spans: dict[Motion, Rows], rate_hz: float) -> Felt:
     """Return what one sensor felt in the three spans."""
+    from scipy.signal import butter, sosfiltfilt  # at its use: most of the time in which fusion would start
+
     hang = slice(*spans["hang"])
     bias = record.gyr[hang].mean(axis=0)
     force = record.acc[hang].mean(axis=0)

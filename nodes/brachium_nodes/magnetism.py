@@ -3,7 +3,6 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import ndtri
 
 from brachium_nodes.movement import Array, Variation
 from brachium_nodes.sensors import FIELD_UT
@@ -57,6 +56,8 @@ def wandering(t: Array, variation: Variation) -> Array:
 
     It is a sum of waves whose frequencies are spread as the spectrum of its autocorrelation is: normally.
     """
+    from scipy.special import ndtri  # at its use: few wearers move in a disturbed field, all must start
+
     index = np.arange(_WAVES)
     axes = []
     for axis in "xyz":

@@ -54,6 +54,13 @@ def test_importing_brachium_loads_nothing_heavy():
     assert done.returncode == 0, done.stderr
 
 
+@pytest.mark.parametrize("service", ["brachium_nodes.emulate", "brachium_fusion.service"])
+def test_a_service_starts_without_what_takes_longest_to_import(service: str):
+    code = f"import sys, {service}\nsys.exit('scipy.signal' in sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+
+
 @pytest.mark.parametrize("name", COMMANDS)
 def test_each_command_explains_itself_with_an_example(name: str, capsys: pytest.CaptureFixture[str]):
     with pytest.raises(SystemExit) as ended:
@@ -220,15 +227,30 @@ def test_pages_do_not_start_over_a_store_that_can_keep_nothing(
     assert "no store of sessions" in capsys.readouterr().err
 
 
+def only_line(command: str, stderr: str) -> str:
+    """Return the one line that a command says of its bad input."""
+    assert "Traceback" not in stderr
+    (said,) = [line for line in stderr.splitlines() if line.startswith(f"brachium {command}: ")]
+    return said
+
+
 @pytest.mark.parametrize("case", BAD_INPUT)
-def test_bad_input_is_one_line_and_code_2(case: str, brachium):
+def test_bad_input_is_one_line_and_code_2(case: str, capsys: pytest.CaptureFixture[str]):
+    words, expected = BAD_INPUT[case]
+    try:
+        code = main([*words])
+    except SystemExit as ended:
+        code = ended.code
+    assert code == 2
+    assert expected in only_line(words[0], capsys.readouterr().err)
+
+
+@pytest.mark.parametrize("case", ["unknown filter", "no such input"])  # one the parser's, one the command's
+def test_a_process_ends_with_that_code(case: str, brachium):
     words, expected = BAD_INPUT[case]
     done = brachium(*words)
-    said = [line for line in done.stderr.splitlines() if line.startswith(f"brachium {words[0]}: ")]
     assert done.returncode == 2, done.stderr
-    assert len(said) == 1
-    assert expected in said[0]
-    assert "Traceback" not in done.stderr
+    assert expected in only_line(words[0], done.stderr)
 
 
 def test_a_missing_extra_is_one_line_that_names_it(brachium, tmp_path, monkeypatch):
