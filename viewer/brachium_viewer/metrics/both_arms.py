@@ -50,12 +50,14 @@ def components(motion: ArmMotion) -> Components | None:
     table = table[np.isfinite(table).all(axis=1)]
     if len(table) < 2 * len(names):
         return None
-    _, spread, directions = np.linalg.svd(table - table.mean(axis=0), full_matrices=False)
-    if spread[0] < 1e-9:
+    table = table - table.mean(axis=0)
+    squares, vectors = np.linalg.eigh(table.T @ table)
+    spread, directions = np.maximum(squares[::-1], 0.0), vectors.T[::-1]
+    if spread[0] < 1e-18:
         return None
     largest = directions[np.arange(len(names)), np.abs(directions).argmax(axis=1)]
     return Components(
         names=names,
-        explained=spread**2 / np.sum(spread**2),
+        explained=spread / np.sum(spread),
         directions=directions * np.sign(largest)[:, None],
     )
