@@ -8,10 +8,15 @@ import pytest
 
 from brachium_fusion.alignment_warnings import warnings_for
 from brachium_viewer.web.files import FOLDER, pages
+from brachium_wire import keys
+from brachium_wire.bus import Bus
+from brachium_wire.codec import encode
+from brachium_wire.messages import Calibration
 
 sync_api = pytest.importorskip("playwright.sync_api")
 CHROMIUM = shutil.which("chromium")
 
+SOFTWARE = ["--no-sandbox", "--disable-gpu", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
 pytestmark = [pytest.mark.browser, pytest.mark.skipif(CHROMIUM is None, reason="needs Chromium")]
 
 BLANK = re.compile(r"\{(\w+)\}")
@@ -19,7 +24,15 @@ ADDRESS = "http://pages.test"
 
 
 @pytest.fixture(scope="module")
-def told():
+def browser():
+    with sync_api.sync_playwright() as playwright:
+        one = playwright.chromium.launch(executable_path=CHROMIUM, headless=True, args=SOFTWARE)
+        yield one
+        one.close()
+
+
+@pytest.fixture(scope="module")
+def told(browser):
     """What a page in a language makes of texts."""
     files = pages()
 
@@ -30,22 +43,19 @@ def told():
         else:
             route.fulfill(body=file.body, content_type=file.kind)
 
-    with sync_api.sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=CHROMIUM, headless=True, args=["--no-sandbox"])
-        page = browser.new_page()
-        page.route("**/*", serve)
-        page.goto(f"{ADDRESS}/nothing")
+    page = browser.new_page()
+    page.route("**/*", serve)
+    page.goto(f"{ADDRESS}/nothing")
 
-        def ask(language: str, texts: list[str | None]) -> list[str]:
-            asked = """async ([language, texts]) => {
-                const { speak, told } = await import("/app/words.js");
-                await speak(language);
-                return texts.map(told);
-            }"""
-            return page.evaluate(asked, [language, texts])
+    def ask(language: str, texts: list[str | None]) -> list[str]:
+        asked = """async ([language, texts]) => {
+            const { speak, told } = await import("/app/words.js");
+            await speak(language);
+            return texts.map(told);
+        }"""
+        return page.evaluate(asked, [language, texts])
 
-        yield ask
-        browser.close()
+    return ask
 
 
 def german() -> dict[str, str]:
@@ -103,3 +113,34 @@ def test_english_is_as_it_came_but_for_the_names_of_parts(told):
     texts = ["upper_arm_l was not still", "something nobody wrote down: 3 s"]
     assert told("en", texts) == ["Left upper arm was not still", texts[1]]
     assert told("de", texts) == ["Linker Oberarm was not still", texts[1]]
+
+
+@pytest.mark.network
+def test_the_therapists_page_gives_fusions_reasons_in_german(browser, serve_pages, moving_arm, tmp_path):
+    refused = (
+        "forearm_r was not still for 3 s within 30 s; stand still (slower than 0.15 rad/s) and ask again"
+    )
+    few = "too little movement: the elbow bent by 5 deg, at least 30 are needed; bend and straighten it"
+    (warning,) = warnings_for("elbow", ("forearm_r",), (), [], {"from_nominal_deg_forearm_r": 92.4})
+    news = Calibration(
+        time_ns=1, state="refused", reason=refused, refused={"elbow_r": few}, warnings=[warning]
+    )
+    with (
+        Bus.open(moving_arm) as bus,
+        serve_pages(endpoint=moving_arm, sessions=tmp_path, open_door=True) as serving,
+    ):
+        bus.retain(keys.calibration("lab", "p01"), encode(news))
+        page = browser.new_context(locale="de-DE").new_page()
+        page.goto(f"{serving.address}/")
+
+        def holds(identity: str, text: str) -> None:
+            sync_api.expect(page.locator(identity)).to_contain_text(text, timeout=60_000)
+
+        holds("#calibration-state", "Rechter Unterarm war innerhalb von 30 s nie 3 s lang still")
+        holds("#calibration-notes", "Der Ellbogen beugte sich um 5°, mindestens 30° sind nötig")
+        holds("#calibration-notes", "oder der Arm war nicht in der Haltung")
+        page.click("#zero")
+        holds("#calibration-state", "Die Auswertung antwortet nicht")
+        page.click("#language")
+        holds("#calibration-notes", "or the arm was not in the pose")
+        page.close()
