@@ -88,7 +88,10 @@ def differences(source: Table, to: str, folder: Path) -> dict[str, Any]:
     files = formats.export(source, out, formats.Wish(to=to), version())
     found = readers.READERS[to](out)
     held, told = _held(found, len(source)), _angles(source)
-    angles = [compared(source.columns[n], v, 360.0) for n, v in found.angles_deg.items() if n in told]
+    pairs = {n: (source.columns[n], v) for n, v in found.angles_deg.items() if n in told}
+    if found.whole_instants:
+        pairs = _whole_instants(source.columns["time"], found.time_s, pairs)
+    angles = [compared(ours, theirs, 360.0) for ours, theirs in pairs.values()]
     places = [compared(_place_mm(source, n), v, None, held.get(n)) for n, v in found.places_mm.items()]
     every = (*angles, *places)
     return {
@@ -102,6 +105,20 @@ def differences(source: Table, to: str, folder: Path) -> dict[str, Any]:
         "gaps": sum(one.gaps for one in every),
         "gaps_off": sum(one.gaps_off for one in every),
     }
+
+
+def _whole_instants(
+    time_s: Floats, found_s: Floats, pairs: dict[str, tuple[Floats, Floats]]
+) -> dict[str, tuple[Floats, Floats]]:
+    """Return pairs with nothing known wherever one of them is not, and what was found (m,) at its times."""
+    whole = np.isfinite(np.stack([ours for ours, _ in pairs.values()])).all(axis=0)
+    rows = np.argmin(np.abs(time_s[:, None] - found_s[None, :]), axis=0)
+    out = {}
+    for name, (ours, theirs) in pairs.items():
+        there = np.full(len(time_s), np.nan)
+        there[rows] = theirs
+        out[name] = np.where(whole, ours, np.nan), there
+    return out
 
 
 @dataclass(frozen=True)

@@ -1,5 +1,6 @@
 """What is exported: a result as it is, a recording's live skeletons, a capture folder solved on the way."""
 
+import logging
 from contextlib import suppress
 from pathlib import Path
 
@@ -13,6 +14,8 @@ from brachium_wire.codec import WireError, decode_topic
 from brachium_wire.messages import Event, Skeleton
 from brachium_wire.recording import Recorded
 from brachium_wire.table import Table
+
+_log = logging.getLogger(__name__)
 
 SIDES = ("right", "left")
 OWN_KINDS = ("applied", "settings")
@@ -31,17 +34,23 @@ def table_of(source: Path, subject: str | None) -> Table:
         if found is not None:
             return found
     settings = solve.SolveSettings(input=source, subject=subject)
-    return tabled(settings, solve.outcome_of(settings))
+    outcome = solve.outcome_of(settings)
+    for warning in outcome.warnings:
+        _log.warning("%s", warning)
+    return tabled(settings, outcome)
 
 
 def _live(source: Path, subject: str | None) -> Table | None:
     """Return a recording's skeletons as they were live; None when it has samples alone."""
     with recording.read(source) as messages:
         arrived = list(messages)
+        warning = messages.warning
     subjects = from_recording.sort_out(arrived)
     moving = {name: contents for name, contents in subjects.items() if contents.live}
     if not moving:
         return None
+    if warning:
+        _log.warning("%s", warning)
     if subject is not None and subject not in moving:
         if subject in subjects and subjects[subject].samples:
             return None

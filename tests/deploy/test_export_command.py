@@ -203,3 +203,21 @@ def test_nothing_emulated_in_part_goes_as_worn(live: Path):
     mixed = [msgspec.structs.replace(s, origin="worn") for s in contents.live[:5]]
     assert origin_of([*mixed, *contents.live[5:]]) == "emulated"
     assert origin_of(mixed) == "worn"
+
+
+def test_the_input_is_not_written_over(live: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]):
+    out = tmp_path / "arms.csv"
+    assert run("export", live, "--out", out) == 0
+    before = out.read_bytes()
+    assert run("export", out, "--out", out, "--from", 1) == 2
+    assert "is the input itself; choose another name" in capsys.readouterr().err
+    assert out.read_bytes() == before
+
+
+def test_a_recording_that_was_cut_is_exported_up_to_the_cut_and_said_to_be(
+    live: Path, tmp_path: Path, caplog: pytest.LogCaptureFixture
+):
+    cut = tmp_path / "cut.mcap"
+    cut.write_bytes(live.read_bytes()[:-200])
+    assert run("export", cut, "--out", tmp_path / "arms.csv") == 0
+    assert "cut.mcap: not closed: read up to the cut" in caplog.text

@@ -21,6 +21,8 @@ class Found:
     places_mm: dict[str, Floats] = field(default_factory=dict)
     held: dict[str, list[list[int]]] = field(default_factory=dict)
     """Of a format that cannot leave anything out: frames that repeat the last one, by joint."""
+    whole_instants: bool = False
+    """Of a format that leaves out every instant at which one of its numbers is not known."""
 
 
 def trunk_axes(places: Floats) -> Floats:

@@ -48,10 +48,14 @@ def _zxy(parent: Floats | None, child: Floats | None, end: str) -> Floats | None
 
 
 def read_mot(path: Path) -> Found:
-    """Read with OpenSim."""
+    """Read with both of OpenSim's readers. Raises ValueError where one of them finds less."""
     import opensim
 
+    opensim.Logger.setLevelString("error")  # Storage tells of each file on standard output
     table = opensim.TimeSeriesTable(str(path))
+    stored = opensim.Storage(str(path)).getSize()
+    if stored != table.getNumRows():
+        raise ValueError(f"{path}: OpenSim's Storage reads {stored} of {table.getNumRows()} rows")
     matrix = table.getMatrix()
     cells = np.array(matrix.to_numpy())
     if table.getTableMetaDataString("inDegrees") != "yes":
@@ -60,6 +64,7 @@ def read_mot(path: Path) -> Found:
         reader=f"OpenSim {opensim.GetVersion()}",
         time_s=np.array(list(table.getIndependentColumn())),
         angles_deg=_our_angles({label: cells[:, i] for i, label in enumerate(table.getColumnLabels())}),
+        whole_instants=True,
     )
 
 

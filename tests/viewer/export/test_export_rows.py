@@ -101,3 +101,43 @@ def test_every_number_of_a_result_has_its_quality(result: Table):
     left = rows.measured(Table(result.columns | words, result.units, result.metadata))
     stays = {n for n, v in left.columns.items() if v.dtype.kind == "f" and np.isfinite(v).any()}
     assert stays == {"time"}
+
+
+def with_silence(sensor: str) -> Table:
+    """Return a left arm with sensors on upper arm and forearm, `sensor`'s silent in rows 2 and 3."""
+    words = np.array(["good", "good", "missing", "missing", "held"])
+    calm = np.array(["good"] * 5)
+    assumed = np.array(["good", "good", "assumed", "assumed", "good"])
+    columns = {"time": np.arange(5) / 50.0}
+    for part in ("upper_arm", "forearm"):
+        columns[f"quality_{part}_l"] = words if part == sensor else calm
+    columns |= {"elbow_flexion": np.array([5.0, 6.0, 104.0, 103.0, 7.0]), "quality_elbow_angles": assumed}
+    for joint in ("elbow", "hand"):
+        columns |= {f"{joint}_{axis}": np.arange(5.0) for axis in "xyz"}
+    columns["quality_hand_position"] = np.array(["assumed"] * 5)  # there never was a sensor on the hand
+    columns["quality_elbow_position"] = assumed if sensor == "upper_arm" else calm
+    return Table(columns, {}, {"sides": ["left"]})
+
+
+@pytest.mark.parametrize(("sensor", "elbow_known"), [("upper_arm", 3), ("forearm", 5)])
+def test_what_is_assumed_only_while_a_sensor_is_silent_is_a_gap(sensor: str, elbow_known: int):
+    found = rows.sensed(with_silence(sensor)).columns
+    np.testing.assert_array_equal(found["elbow_flexion"], [5.0, 6.0, np.nan, np.nan, 7.0])
+    assert np.isfinite(found["elbow_z"]).sum() == elbow_known
+    assert np.isfinite(found["hand_x"]).tolist() == [True, True, False, False, True]
+
+
+def test_what_no_sensor_ever_gave_stands_as_it_was_stated():
+    table = with_silence("forearm")
+    never = np.array(["missing"] * 5)
+    table = Table(table.columns | {"quality_forearm_l": never}, {}, table.metadata)
+    found = rows.sensed(table).columns
+    assert all(np.array_equal(found[name], values) for name, values in table.columns.items())
+
+
+def test_a_number_whose_quality_is_missing_is_a_gap():
+    table = with_silence("forearm")
+    words = np.array(["missing", "good", "good", "good", "good"])
+    columns = table.columns | {"theta2": np.ones(5), "quality_shoulder_angles": words}
+    found = rows.sensed(Table(columns, {}, table.metadata)).columns["theta2"]
+    assert np.isnan(found).tolist() == [True, False, False, False, False]

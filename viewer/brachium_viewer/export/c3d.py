@@ -1,5 +1,6 @@
 """C3D, as gait laboratories' tools read it: joint centres as points, joint angles as analogue channels."""
 
+import errno
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +20,7 @@ MOST_FRAMES = 65_535
 def write_c3d(motion: Motion, path: Path) -> list[Path]:
     """Write points in mm and angles in deg; a point that is not known has residual -1.
 
-    Raises TableError without positions, or for more frames than the format counts.
+    Raises TableError without positions, or for more frames than the format counts, OSError.
     """
     import ezc3d
 
@@ -52,7 +53,16 @@ def write_c3d(motion: Motion, path: Path) -> list[Path]:
     made["data"]["meta_points"]["residuals"] = np.where(unknown, -1.0, 0.0)[None]
     made["data"]["analogs"] = np.stack(list(angles.values()))[None] if angles else np.zeros((1, 0, n))
     made.write(str(path))
+    _check_whole(path, n * 4 * (4 * len(places) + len(angles)))
     return [path]
+
+
+def _check_whole(path: Path, data_bytes: int) -> None:
+    """Raise OSError when the file ends before its data does: ezc3d does not tell what it could not write."""
+    with path.open("rb") as file:
+        begins = 512 * (int.from_bytes(file.read(18)[16:], "little") - 1)
+    if begins <= 0 or path.stat().st_size < begins + data_bytes:
+        raise OSError(errno.EIO, "not written whole; is the disk full?", str(path))
 
 
 def _add_events(made: Any, events: list[dict[str, Any]]) -> None:

@@ -4,6 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 from brachium_viewer.export import bvh, c3d, motion_bids, opensim, rows, rrd, tables
 from brachium_viewer.export.about import about
@@ -17,15 +18,19 @@ class Format:
 
     write: Callable[[Motion, Path], list[Path]]
     even: bool
-    """Its instants have one distance: the motion is put on an even grid first."""
+    """The motion is put on an even grid first."""
+    tells_quality: bool = False
+    """It has the columns of quality. One without leaves out what is assumed while a sensor was silent."""
     package: str = ""
     """What it needs, and the extra that brings it."""
     extra: str = ""
 
 
 FORMATS: dict[str, Format] = {
-    "csv": Format(write=tables.write_table, even=False),
-    "parquet": Format(write=tables.write_table, even=False, package="pyarrow", extra="parquet"),
+    "csv": Format(write=tables.write_table, even=False, tells_quality=True),
+    "parquet": Format(
+        write=tables.write_table, even=False, tells_quality=True, package="pyarrow", extra="parquet"
+    ),
     "sto": Format(write=opensim.write_sto, even=True),
     "mot": Format(write=opensim.write_mot, even=True),
     "trc": Format(write=opensim.write_trc, even=True),
@@ -65,13 +70,27 @@ def export(source: Table, out: Path, wish: Wish, made_by: str) -> list[Path]:
         raise MissingExtra(
             f"--to {wish.to} needs the package {chosen.package}: pip install 'brachium[{chosen.extra}]'"
         )
-    return chosen.write(prepared(source, wish, made_by), out)
+    motion_of_it = prepared(source, wish, made_by)
+    if wish.to == "motion-bids":
+        return chosen.write(motion_of_it, out)
+    return _whole(out, lambda fresh: chosen.write(motion_of_it, fresh))
+
+
+def _whole(out: Path, write: Callable[[Path], list[Path]]) -> list[Path]:
+    """Write a file, and those beside it, whole or not at all: what was there before stands until then."""
+    try:
+        with TemporaryDirectory(prefix=".brachium-", dir=out.parent) as scratch:
+            return [path.replace(out.with_name(path.name)) for path in write(Path(scratch, out.name))]
+    except OSError as error:
+        if error.errno is None:
+            raise
+        raise OSError(error.errno, error.strerror, str(out)) from None
 
 
 def prepared(source: Table, wish: Wish, made_by: str) -> Motion:
     """Return the motion that a format gets. Raises TableError."""
     sides = sides_of(source)
-    cut = source
+    cut = source if FORMATS[wish.to].tells_quality else rows.sensed(source)
     if wish.from_s is not None or wish.until_s is not None:
         cut = rows.between(cut, wish.from_s, wish.until_s)
     if wish.measured:

@@ -1,5 +1,6 @@
 """OpenSim: orientations (.sto) for OpenSense, joint angles (.mot), joint centres as markers (.trc)."""
 
+import logging
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +15,8 @@ from brachium_viewer.export.motion import ArmPath, Motion
 from brachium_wire.table import TableError
 
 Floats = npt.NDArray[np.float64]
+
+_log = logging.getLogger(__name__)
 
 OPENSIM_VERSION = "4.6"
 BODY = {"sternum": "torso", "upper_arm": "humerus", "forearm": "radius", "hand": "hand"}
@@ -65,22 +68,35 @@ def _quaternion(q: list[float]) -> str:
 
 
 def write_mot(motion: Motion, path: Path) -> list[Path]:
-    """Write joint angles in degrees as coordinates of a Rajagopal-type model. Raises TableError without."""
+    """Write joint angles in degrees as coordinates of a Rajagopal-type model.
+
+    An instant at which one of them is not known is left out: OpenSim's Storage, which most of its tools read
+    with, ends without a word at the first cell that is no number. Raises TableError where none is left.
+    """
     angles = coordinates_deg(motion)
     if not angles:
         raise TableError("a .mot holds joint angles; leave --columns out, or add theta and clinical")
-    columns = [motion.time_s, *angles.values()]
+    block = np.stack([motion.time_s, *angles.values()], axis=-1)
+    whole = np.asarray(np.isfinite(block).all(axis=1))
+    least = min(angles, key=lambda name: int(np.isfinite(angles[name]).sum()))
+    left_out = f"{int((~whole).sum())} of {len(whole)} instants, most for {least}"
+    if not whole.any():
+        raise TableError(
+            f"a .mot holds instants at which every coordinate is known, and there is none, most for {least}; "
+            "name those that are wanted with --columns"
+        )
+    if not whole.all():
+        _log.warning("left out %s: a .mot cannot say that a number is not known; see --columns", left_out)
     head = [
         "Coordinates",
         "version=1",
-        f"nRows={len(motion.time_s)}",
-        f"nColumns={len(columns)}",
+        f"nRows={int(whole.sum())}",
+        f"nColumns={block.shape[1]}",
         "inDegrees=yes",
-        f"{KEY}={one_line(motion.about)}",
+        f"{KEY}={one_line(motion.about | ({} if whole.all() else {'left_out': left_out}))}",
         "endheader",
     ]
-    rows = [["nan" if x != x else repr(x) for x in row] for row in np.stack(columns, axis=-1).tolist()]
-    return _write(path, head, ["time", *angles], rows)
+    return _write(path, head, ["time", *angles], [[repr(x) for x in row] for row in block[whole].tolist()])
 
 
 def coordinates_deg(motion: Motion) -> dict[str, Floats]:

@@ -99,6 +99,51 @@ def measured(table: Table) -> Table:
     return Table(columns, table.units, table.metadata)
 
 
+def sensed(table: Table) -> Table:
+    """Return the table without what rests on a sensor that was silent: there is a gap.
+
+    That is what is `missing`, and what is assumed of a segment that is heard at other instants. One that is
+    heard at none has no sensor: what is assumed of it stands, as the exercise states it. Columns whose
+    quality is not told stand, too.
+    """
+    columns = dict(table.columns)
+    for name, values in columns.items():
+        told = _quality(name)
+        gone = [rows for s in _rests_on(told, table) if (rows := _fell_silent(table, s)) is not None]
+        if values.dtype.kind == "f" and told in table.columns:
+            words = table.columns[told]
+            silent = np.any([np.zeros(len(table), dtype=np.bool_), *gone], axis=0)
+            left_out = (words == "missing") | ((words == "assumed") & silent)
+            columns[name] = np.where(left_out, np.nan, values)
+    return Table(columns, table.units, table.metadata)
+
+
+RESTS_ON = {
+    "shoulder_position": ("upper_arm",),
+    "elbow_position": ("upper_arm",),
+    "elbow_angles": ("upper_arm", "forearm"),
+    "wrist_position": ("upper_arm", "forearm"),
+    "wrist_angles": ("forearm", "hand"),
+    "hand_position": ("upper_arm", "forearm", "hand"),
+}
+"""Whose sensors give a number: without one of them it is assumed, if it is known at all."""
+
+
+def _rests_on(quality: str, table: Table) -> list[str]:
+    """Return the segments whose sensors give what a column of quality tells of."""
+    bare = quality.removeprefix("quality_").removesuffix("_r").removesuffix("_l")
+    ends = [quality[-2:]] if quality.endswith(("_r", "_l")) else ["_r", "_l"]
+    named = [part + end for part in RESTS_ON.get(bare, ()) for end in ends]
+    return [segment for segment in named if f"quality_{segment}" in table.columns]
+
+
+def _fell_silent(table: Table, segment: str) -> npt.NDArray[np.bool_] | None:
+    """Return where (n,) a segment's sensor is missing that is heard at other instants; None: it never is."""
+    words = table.columns[f"quality_{segment}"]
+    silent = np.isin(words, ["missing", ""])
+    return None if silent.all() or not silent.any() else silent
+
+
 def _quality(column: str) -> str:
     """Return the name of the column that tells how far to trust another."""
     end = column[-2:] if column.endswith(("_r", "_l")) else ""
