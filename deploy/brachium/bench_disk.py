@@ -2,6 +2,7 @@
 
 import json
 import random
+import socket
 import subprocess
 import sys
 import threading
@@ -12,6 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from brachium.bench_crowd import subjects
 from brachium.checks import free_port
 from brachium.processes import Child, Processes
 from brachium.shell import Failed
@@ -40,6 +42,8 @@ class FullDisk:
     """As the recorder's health tells it."""
     on_monitor: bool
     on_page: bool
+    page_stops: bool
+    """The pages' own recording, on the same disk, is shown as stopped with its alarm, not as going on."""
     frames_per_s: float
     """Frames that a page got afterwards."""
     skeletons_per_s: float
@@ -60,8 +64,6 @@ def full_disk(
     network = ["--endpoint", endpoint, "--room", room]
     processes.start("fuse", ["fuse", *network], stderr=folder / "fuse.err")
     port = free_port()
-    web = ["web", *network, "--port", str(port), "--no-password", "--sessions", str(folder / "sessions")]
-    processes.start("web", web, stdout=folder / "web", stderr=folder / "web.err")
     shown = folder / "monitor.jsonl"
     processes.start("monitor", ["monitor", *network, "--json"], stdout=shown, stderr=folder / "monitor.err")
     crowd = ["brachium.bench_crowd", endpoint, room, str(ARMS), f"{FULL_S + 60.0}"]
@@ -72,6 +74,10 @@ def full_disk(
     threading.Event().wait(SETTLE_S)
     with _small_disk(folder) as (disk, out, prefix):
         runner = Processes(command=(*prefix, *processes.command))
+        web = ["web", *network, "--port", str(port), "--no-password", "--sessions", str(out / "sessions")]
+        runner.start("web", web, stdout=folder / "web", stderr=folder / "web.err")
+        if not _seen(lambda: _answers(port)):
+            raise Failed("the pages are not served")
         with runner, Page(port) as page:
             health = bus.subscribe(keys.service(room, "recorder", RECORDER))
             before = _rate(skeletons)
@@ -83,6 +89,7 @@ def full_disk(
             frames_per_s = (page.frames - frames) / AFTER_S
             on_monitor = _seen(lambda: told.alarm in shown.read_text("utf-8"))
             on_page = _seen(lambda: any(told.alarm == alarm["reason"] for alarm in page.alarms))
+            page_stops = _seen(lambda: page.recording == "failed", lambda: _fill(bus, room))
             health.wait(SEEN_S)
             last = [decode(payload, Health) for _, payload in health.drain()][-1]
             code = runner.end("record")
@@ -91,7 +98,7 @@ def full_disk(
         with recording.read(path) as messages:
             found = sum(1 for _ in messages)
         indexed = sum(recording.counts(path).values()) if closed else 0
-    for name in ("monitor", "web", "fuse"):
+    for name in ("monitor", "fuse"):
         processes.end(name)
     beside.end("many")
     return FullDisk(
@@ -99,6 +106,7 @@ def full_disk(
         alarm=told.alarm,
         on_monitor=on_monitor,
         on_page=on_page,
+        page_stops=page_stops and bool(page.alarms),
         frames_per_s=frames_per_s,
         skeletons_per_s=after,
         skeletons_before_per_s=before,
@@ -110,13 +118,14 @@ def full_disk(
 
 
 class Page:
-    """A screen on the pages' socket: counts frames, keeps the newest alarms."""
+    """A screen on the pages' socket: begins a session, counts frames, keeps the newest alarms."""
 
     def __init__(self, port: int) -> None:
         self._port, self._stop = port, threading.Event()
         self._thread = threading.Thread(target=self._run)
         self.frames = 0
         self.alarms: list[dict[str, Any]] = []
+        self.recording = "off"
 
     def __enter__(self) -> "Page":
         self._thread.start()
@@ -131,15 +140,17 @@ class Page:
         from websockets.typing import Origin
 
         address = f"127.0.0.1:{self._port}"
-        with connect(f"ws://{address}/ws", origin=Origin(f"http://{address}")) as socket:
+        with connect(f"ws://{address}/ws", origin=Origin(f"http://{address}")) as own:
             while not self._stop.is_set():
                 try:
-                    said = json.loads(socket.recv(timeout=0.2))
+                    said = json.loads(own.recv(timeout=0.2))
                 except TimeoutError:
                     continue
                 self.frames += said["kind"] == "frame"
                 if said["kind"] == "state":
-                    self.alarms = said["alarms"]
+                    if self.recording == "off" and said["sides"]:
+                        own.send(json.dumps({"verb": "mark"}))
+                    self.alarms, self.recording = said["alarms"], said["recording"]["state"]
 
 
 @contextmanager
@@ -164,7 +175,7 @@ def _small_disk(folder: Path) -> Iterator[tuple[str, Path, tuple[str, ...]]]:
 
 def _fill(bus: Bus, room: str) -> None:
     noise = Event(time_ns=0, kind="filler", data={"noise": random.randbytes(FILLER_BYTES)})
-    bus.put(keys.event(room, "filler"), encode(noise))
+    bus.put(keys.event(room, subjects(ARMS)[0]), encode(noise))
 
 
 def _alarm(health: Inbox, recorder: Child, fill: Callable[[], None]) -> Health:
@@ -190,11 +201,20 @@ def _rate(inbox: Inbox) -> float:
     return (inbox.received - first) / (time.monotonic() - begun)
 
 
-def _seen(true: Callable[[], bool]) -> bool:
-    """Return whether it becomes true within some seconds."""
+def _seen(true: Callable[[], bool], meanwhile: Callable[[], None] = lambda: None) -> bool:
+    """Return whether it becomes true within some seconds, doing something again and again."""
     deadline = time.monotonic() + SEEN_S
     while not true():
         if time.monotonic() > deadline:
             return False
-        threading.Event().wait(0.05)
+        meanwhile()
+        threading.Event().wait(FILLER_S)
+    return True
+
+
+def _answers(port: int) -> bool:
+    try:
+        socket.create_connection(("127.0.0.1", port), 1.0).close()
+    except OSError:
+        return False
     return True

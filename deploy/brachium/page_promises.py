@@ -66,6 +66,7 @@ def _recorder() -> Proof:
                 for name, key in (
                     ("no alarm on the monitor", "on_monitor"),
                     ("no alarm on the page", "on_page"),
+                    ("the page's own recording is shown as going on", "page_stops"),
                     ("the file does not open whole", "opens"),
                 )
             ),

@@ -23,6 +23,7 @@ def test_a_killed_recorder_and_a_full_disk_are_measured(monkeypatch: pytest.Monk
     assert 0.0 <= found.kill_worst_s == found.kill_median_s <= min(found.power_worst_s.values())
     assert disk.on_monitor
     assert disk.on_page
+    assert disk.page_stops
     assert disk.let_go > 0
     assert disk.exit_code == 1
     assert "takes no more" in disk.alarm
