@@ -4,11 +4,20 @@ const FIRST_PAUSE_MS = 300;
 const LONGEST_PAUSE_MS = 5000;
 const ANSWER_MS = 320000;
 
+/** What a frame still tells when the line is cut: who and how many, but of no arm where it is now. */
+function silent(frame) {
+  const none = (angles) => Object.fromEntries(Object.keys(angles).map((name) => [name, [null, "missing"]]));
+  const arms = Object.entries(frame.arms).map(([side, arm]) => [side, { ...arm, stale: true, angles: none(arm.angles) }]);
+  const set = frame.set && { ...frame.set, angle: null, over: false };
+  return { ...frame, arms: Object.fromEntries(arms), set };
+}
+
 export class Link {
   /** `heard` has a function for each kind of message: hello, frame, state; and `line(up)` for the line itself. */
   constructor(heard) {
     this.heard = heard;
     this.waiting = new Map();
+    this.newest = null;
     this.number = 0;
     this.pause = FIRST_PAUSE_MS;
     this.open();
@@ -30,12 +39,14 @@ export class Link {
       this.waiting.get(message.id)?.(message);
       this.waiting.delete(message.id);
     } else {
+      if (message.kind === "frame") this.newest = message;
       this.heard[message.kind]?.(message);
     }
   }
 
   async lost() {
     this.heard.line?.(false);
+    if (this.newest) this.heard.frame?.(silent(this.newest));
     for (const answer of this.waiting.values()) answer({ ok: false, reason: "" });
     this.waiting.clear();
     await new Promise((done) => setTimeout(done, this.pause));

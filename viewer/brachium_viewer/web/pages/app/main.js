@@ -35,8 +35,10 @@ function hello(message) {
 
 function line(now) {
   up = now;
-  if (state) showHeadline(state, up);
   document.body.classList.toggle("cut", !up);
+  if (!state) return;
+  showHeadline(state, up);
+  recording();
 }
 
 function frame(message) {
@@ -82,7 +84,7 @@ function news(message) {
 
 function recording() {
   const { state: how, seconds } = state.recording;
-  $("recording").hidden = how !== "on";
+  $("recording").hidden = how !== "on" || !up; // cut off, nobody knows whether it still does
   const time = `${Math.floor((seconds ?? 0) / 60)}:${String((seconds ?? 0) % 60).padStart(2, "0")}`;
   $("recording").textContent = say("recording", { time });
   const alarms = state.alarms.map(({ what, reason }) => say(`alarm.${what}`, { reason: told(reason) }));
