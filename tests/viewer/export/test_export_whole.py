@@ -14,7 +14,7 @@ from brachium_wire.table import Table, TableError
 FILES = [name for name in FORMATS if name != "motion-bids"]
 
 
-def export(result: Table, path: Path, **cut: object) -> list[Path]:
+def export(result: Table, path: Path, **cut: Any) -> list[Path]:
     return formats.export(result, path, Wish(to=path.suffix[1:], **cut), "test")
 
 
@@ -54,7 +54,7 @@ def test_a_c3d_file_that_was_cut_is_told(result: Table, tmp_path: Path, monkeypa
 
     write = ezc3d.c3d.write
 
-    def cut(self: object, path: str) -> None:
+    def cut(self: Any, path: str) -> None:
         write(self, path)
         whole = Path(path).read_bytes()
         Path(path).write_bytes(whole[:-600])  # it ends in a block of 512
@@ -102,3 +102,30 @@ def test_a_mot_without_a_whole_instant_says_which_coordinate_to_leave_out(result
     with pytest.raises(TableError, match="most for elbow_flex_r; name those that are wanted with --columns"):
         export(Table(columns, result.units, result.metadata), tmp_path / "arm.mot")
     assert not list(tmp_path.iterdir())
+
+
+def test_a_study_on_a_full_disk_keeps_what_it_had_and_takes_the_recording_later(
+    result: Table, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    study, write = tmp_path / "study", Path.write_text
+    formats.export(result, study, Wish(to="motion-bids", until_s=0.5), "test")
+    people = (study / "participants.tsv").read_text()
+    other = Table(result.columns, result.units, result.metadata | {"subject": "p02"})
+    for full in ("participants.tsv", "_motion.tsv"):
+
+        def fails(path: Path, text: str, *rest: Any, full: str = full, **named: Any) -> int:
+            written = write(path, text[:5], *rest, **named)
+            if full in path.name:
+                raise OSError(28, "No space left on device", str(path))
+            return written and write(path, text, *rest, **named)
+
+        with monkeypatch.context() as patch:
+            patch.setattr(Path, "write_text", fails)
+            with pytest.raises(OSError, match="No space left"):
+                formats.export(other, study, Wish(to="motion-bids", until_s=0.5), "test")
+        assert (study / "participants.tsv").read_text().startswith(people)
+        assert not list(study.rglob(".*"))
+        assert not list(study.rglob("sub-p02*_motion.tsv"))
+    formats.export(other, study, Wish(to="motion-bids", until_s=0.5), "test")
+    assert (study / "participants.tsv").read_text() == people + "sub-p02\tplayback\n"
+    assert len(list(study.rglob("*_motion.tsv"))) == 2

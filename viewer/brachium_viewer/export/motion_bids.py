@@ -56,15 +56,17 @@ def write_motion_bids(motion: Motion, folder: Path) -> list[Path]:
         raise TableError(f"{tsv}: is there already; give another --session or --task")
     where.mkdir(parents=True, exist_ok=True)
     found = channels(motion)
-    block = np.stack([channel.values for channel in found], axis=-1)
-    _write_tsv(tsv, ([_cell(x) for x in row] for row in block.tolist()))
     heads = ("name", "component", "type", "tracked_point", "units", "reference_frame")
     _write_tsv(where / f"{stem}_channels.tsv", [heads, *([getattr(c, h) for h in heads] for c in found)])
     _write_json(where / f"{stem}_channels.json", FRAMES)
     _write_json(where / f"{stem}_motion.json", _described(motion, task, found))
     if motion.events:
         _write_tsv(where / f"{stem.replace(f'_tracksys-{SYSTEM}', '')}_events.tsv", _events(motion))
-    return [*_study(folder, subject, motion), tsv]
+    study = _study(folder, subject, motion)
+    # Last: only a recording whose numbers are there is there already.
+    block = np.stack([channel.values for channel in found], axis=-1)
+    _write_tsv(tsv, ([_cell(x) for x in row] for row in block.tolist()))
+    return [*study, tsv]
 
 
 def _events(motion: Motion) -> list[list[str]]:
@@ -209,8 +211,19 @@ def _cell(value: float) -> str:
 
 
 def _write_tsv(path: Path, rows: Iterable[Iterable[str]]) -> None:
-    path.write_text("".join("\t".join(row) + "\n" for row in rows), encoding="utf-8", newline="\n")
+    _write(path, "".join("\t".join(row) + "\n" for row in rows))
 
 
 def _write_json(path: Path, content: dict[str, Any]) -> None:
-    path.write_text(json.dumps(content, indent=2, allow_nan=False) + "\n", encoding="utf-8")
+    _write(path, json.dumps(content, indent=2, allow_nan=False) + "\n")
+
+
+def _write(path: Path, text: str) -> None:
+    """Write a file whole or not at all: a full disk takes nobody from the list of participants."""
+    fresh = path.with_name(f".{path.name}.new")
+    try:
+        fresh.write_text(text, encoding="utf-8", newline="\n")
+        fresh.replace(path)
+    except OSError:
+        fresh.unlink(missing_ok=True)
+        raise
