@@ -1,13 +1,18 @@
 """What all tests share: how Hypothesis judges, and a router of the product's own settings."""
 
+import os
 import socket
 import subprocess
 import sys
 from collections.abc import Iterator
+from contextlib import ExitStack
+from typing import Any
 
 import pytest
 from hypothesis import HealthCheck, settings
 
+from brachium.browser import chromium
+from brachium.shell import Failed
 from brachium_router import config
 
 # Tests judge counts and orderings, never time: a busy machine must not fail them.
@@ -69,3 +74,17 @@ def endpoint() -> Iterator[str]:
     """Where a router listens that the tests of one file share."""
     for process in _running():
         yield process.endpoint
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    """The machine's Chromium; where everything must run, a missing one is a failure.
+
+    It ends with its module: its driver keeps an event loop running, and other tests need one of their own.
+    """
+    with ExitStack() as stack:
+        try:
+            one = stack.enter_context(chromium())
+        except Failed as missing:
+            (pytest.fail if os.environ.get("CI") == "true" else pytest.skip)(str(missing))
+        yield one

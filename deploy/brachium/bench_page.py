@@ -5,11 +5,8 @@ browser begins the next one. Both pages hang on the same server, one after the o
 opened once and watched for several windows.
 """
 
-import shutil
 import threading
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from statistics import median
@@ -20,6 +17,7 @@ import numpy as np
 
 from brachium.bench_gateway import start_router
 from brachium.bench_run import WINDOWS, cpu_seconds, pid
+from brachium.browser import chromium
 from brachium.checks import free_port
 from brachium.processes import Child, Processes
 from brachium.shell import Failed
@@ -34,15 +32,6 @@ if TYPE_CHECKING:
 READY_S = 60.0
 SETTLE_S = 4.0
 """A page's first second compiles what draws it."""
-CHROMIUM = ("chromium", "chromium-browser", "google-chrome")
-SOFTWARE = [
-    "--no-sandbox",
-    "--disable-gpu",
-    "--use-angle=swiftshader",
-    "--enable-unsafe-swiftshader",
-    "--disable-quic",
-]
-"""No graphics card: the page is put together by the processor, and so is what WebGL draws."""
 
 # Notes how long ago a frame was published when its picture was done. Every picture begins with clear.
 LISTENER = """
@@ -151,24 +140,6 @@ def start_pages(processes: Processes, folder: Path, endpoint: str, bus: Bus) -> 
 
 def _said(folder: Path) -> str:
     return (folder / "web.out").read_text("utf-8") if (folder / "web.out").exists() else ""
-
-
-@contextmanager
-def chromium() -> "Iterator[Browser]":
-    """Start the machine's Chromium without a screen. Raises Failed without it or playwright."""
-    program = next((found for name in CHROMIUM if (found := shutil.which(name))), None)
-    if program is None:
-        raise Failed("this needs Chromium (apt install chromium)")
-    try:
-        from playwright.sync_api import sync_playwright
-    except ModuleNotFoundError:
-        raise Failed("this needs playwright, which drives Chromium: pip install playwright") from None
-    with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=program, headless=True, args=SOFTWARE)
-        try:
-            yield browser
-        finally:
-            browser.close()
 
 
 def _watched(

@@ -15,7 +15,7 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from brachium import emulated_session
-from brachium.bench_page import chromium
+from brachium.browser import chromium
 from brachium.shell import Failed
 from brachium_wire import recording
 

@@ -1,7 +1,6 @@
 """The live view in a real browser, judged by its picture and by what the browser asked for.
 
-BRACHIUM_CHROMIUM       the browser (default /usr/bin/chromium)
-BRACHIUM_KEEP_PICTURE   where the picture is kept; nowhere if unset
+BRACHIUM_KEEP_PICTURE names where the picture is kept; nowhere if unset.
 """
 
 import io
@@ -26,40 +25,14 @@ from brachium_wire.messages import Calibration, Status
 
 pytestmark = [pytest.mark.browser, pytest.mark.network]
 
-CHROMIUM = Path(os.environ.get("BRACHIUM_CHROMIUM", "/usr/bin/chromium"))
 KEEP = os.environ.get("BRACHIUM_KEEP_PICTURE")
 SIZE = (1400, 900)
 SEEN_S = 180.0
 """A browser without a graphics card needs its time."""
-FLAGS = [
-    "--no-sandbox",  # containers
-    "--use-angle=swiftshader",
-    "--enable-unsafe-swiftshader",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-quic",
-    "--disable-sync",
-    "--no-first-run",
-]
 COUNT_REFUSED = """
     window.refused = [];
     document.addEventListener("securitypolicyviolation", (event) => window.refused.push(event.blockedURI));
 """
-
-
-def require() -> Any:
-    """Return playwright, or skip; where everything must run, a missing browser is a failure."""
-    try:
-        from playwright.sync_api import sync_playwright
-    except ImportError:
-        missing = "playwright is not installed"
-    else:
-        if CHROMIUM.exists():
-            return sync_playwright
-        missing = f"no browser at {CHROMIUM}; set BRACHIUM_CHROMIUM"
-    if os.environ.get("CI") == "true":
-        pytest.fail(missing)
-    pytest.skip(missing)
 
 
 @contextmanager
@@ -148,14 +121,13 @@ def hosts(urls: list[str]) -> set[str | None]:
     return {urlsplit(url).hostname for url in urls if not url.startswith(("data:", "blob:"))}
 
 
-def test_the_arm_is_seen_and_moves_and_the_browser_talks_to_nobody_else(router_endpoint, arm_at, open_view):
-    sync_playwright = require()
+def test_the_arm_is_seen_and_moves_and_the_browser_talks_to_nobody_else(
+    browser, router_endpoint, arm_at, open_view
+):
     with (
         open_view(router_endpoint, rate_hz=10.0) as running,
         moving(router_endpoint, arm_at),
-        sync_playwright() as driver,
     ):
-        browser = driver.chromium.launch(executable_path=str(CHROMIUM), headless=True, args=FLAGS)
         page = browser.new_page(viewport={"width": SIZE[0], "height": SIZE[1]})
         page.add_init_script(COUNT_REFUSED)
         requests: list[str] = []
@@ -179,7 +151,7 @@ def test_the_arm_is_seen_and_moves_and_the_browser_talks_to_nobody_else(router_e
             _, png = wait_for(page, lambda seen: min(seen.counts.values()) > 400, "no arm was seen")
             Path(KEEP).parent.mkdir(parents=True, exist_ok=True)
             Path(KEEP).write_bytes(png)
-        browser.close()
+        page.close()
 
     assert moved.hand != first.hand
     assert hosts(requests) == {"127.0.0.1"}

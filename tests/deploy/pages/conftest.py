@@ -1,7 +1,6 @@
 """One network and one browser for all that is looked at on the pages.
 
-BRACHIUM_CHROMIUM    the browser (default /usr/bin/chromium)
-BRACHIUM_PICTURES    where pictures of each step are kept (default build/pictures)
+BRACHIUM_PICTURES names where pictures of each step are kept (default build/pictures).
 """
 
 import math
@@ -16,7 +15,7 @@ from urllib.parse import urlsplit
 
 import pytest
 from axe_playwright_python.sync_playwright import Axe
-from playwright.sync_api import Error, sync_playwright
+from playwright.sync_api import Error
 
 from brachium.checks import free_port
 from brachium.demo_network import site_text
@@ -26,18 +25,7 @@ from brachium_nodes.wearer import WearerSettings
 from brachium_wire import keys
 from brachium_wire.bus import Bus
 
-CHROMIUM = Path(os.environ.get("BRACHIUM_CHROMIUM", "/usr/bin/chromium"))
 PICTURES = Path(os.environ.get("BRACHIUM_PICTURES", Path(__file__).parents[3] / "build" / "pictures"))
-FLAGS = [
-    "--no-sandbox",  # containers
-    "--use-angle=swiftshader",
-    "--enable-unsafe-swiftshader",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-quic",
-    "--disable-sync",
-    "--no-first-run",
-]
 ROOM = "demo"
 UP_S = 90.0
 LOOK_S = 0.05
@@ -257,23 +245,6 @@ def network(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Network]:
         one = Network(tmp_path_factory.mktemp("pages"), processes)
         one.start()
         yield one
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    """Debian's Chromium; where everything must run, a missing one is a failure.
-
-    It ends with its module: its driver keeps an event loop running, and other tests need one of their own.
-    """
-    missing = "" if CHROMIUM.exists() else f"no browser at {CHROMIUM}; set BRACHIUM_CHROMIUM"
-    if missing and os.environ.get("CI") == "true":
-        pytest.fail(missing)
-    if missing:
-        pytest.skip(missing)
-    with sync_playwright() as driver:
-        one = driver.chromium.launch(executable_path=str(CHROMIUM), headless=True, args=FLAGS)
-        yield one
-        one.close()
 
 
 @pytest.fixture

@@ -1,12 +1,9 @@
 """Whoever follows the goal never passes the limit: the page holds the goal back, and the server refuses."""
 
-import shutil
-
 import pytest
 
 from brachium_viewer.web.files import pages
 
-CHROMIUM = shutil.which("chromium")
 ADDRESS = "http://pages.test"
 BODY = """<!doctype html><div id="exercise"><select id="which"></select><p id="which-what"></p>
 <div id="sides"></div><div id="modes"></div><div id="numbers"></div></div>"""
@@ -34,9 +31,7 @@ def test_a_goal_beyond_the_limit_is_refused(moving_arm, serve_pages, watch, tmp_
 
 
 @pytest.mark.browser
-@pytest.mark.skipif(CHROMIUM is None, reason="needs Chromium")
-def test_the_page_holds_the_goal_back():
-    sync_api = pytest.importorskip("playwright.sync_api")
+def test_the_page_holds_the_goal_back(browser):
     files = pages()
 
     def serve(route):
@@ -44,33 +39,31 @@ def test_the_page_holds_the_goal_back():
         body, kind = (BODY, "text/html") if file is None else (file.body, file.kind)
         route.fulfill(body=body, content_type=kind)
 
-    with sync_api.sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=CHROMIUM, headless=True, args=["--no-sandbox"])
-        page = browser.new_page()
-        page.route("**/*", serve)
-        page.goto(f"{ADDRESS}/nothing")
-        page.evaluate("""async () => {
-            const { Plan } = await import("/app/plan.js");
-            window.plan = new Plan(() => {});
-            plan.offer([
-              { name: "elbow-flexion", rises: true, goal_deg: 120 },
-              { name: "elbow-extension", rises: false, goal_deg: 10 },
-            ]);
-        }""")
+    page = browser.new_page()
+    page.route("**/*", serve)
+    page.goto(f"{ADDRESS}/nothing")
+    page.evaluate("""async () => {
+        const { Plan } = await import("/app/plan.js");
+        window.plan = new Plan(() => {});
+        plan.offer([
+          { name: "elbow-flexion", rises: true, goal_deg: 120 },
+          { name: "elbow-extension", rises: false, goal_deg: 10 },
+        ]);
+    }""")
 
-        def goal() -> float:
-            return page.evaluate("plan.words.goal_deg")
+    def goal() -> float:
+        return page.evaluate("plan.words.goal_deg")
 
-        assert goal() == 120
-        page.check("#use-limit")
-        assert page.input_value("#plan-limit") == "90"
-        assert goal() == 90
-        page.fill("#plan-goal", "140")
-        page.press("#plan-goal", "Tab")
-        assert goal() == 90
-        page.fill("#plan-limit", "20")
-        page.press("#plan-limit", "Tab")
-        assert goal() == 20
-        page.select_option("#which", "elbow-extension")  # its goal of 10 is straighter than 20
-        assert goal() == 20
-        browser.close()
+    assert goal() == 120
+    page.check("#use-limit")
+    assert page.input_value("#plan-limit") == "90"
+    assert goal() == 90
+    page.fill("#plan-goal", "140")
+    page.press("#plan-goal", "Tab")
+    assert goal() == 90
+    page.fill("#plan-limit", "20")
+    page.press("#plan-limit", "Tab")
+    assert goal() == 20
+    page.select_option("#which", "elbow-extension")  # its goal of 10 is straighter than 20
+    assert goal() == 20
+    page.close()

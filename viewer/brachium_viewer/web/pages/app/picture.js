@@ -85,8 +85,8 @@ export class Picture {
     this.renderer.setSize(wide, high, false);
     this.camera.aspect = wide / high;
     this.camera.updateProjectionMatrix();
-    if (this.own) this.draw();
-    else this.frame();
+    if (!this.own) this.frame();
+    this.renderer.render(this.scene, this.camera); // at once: another size emptied the canvas
   }
 
   show(arms, beyond) {

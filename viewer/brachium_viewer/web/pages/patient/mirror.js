@@ -45,7 +45,7 @@ export class Mirror {
     this.camera.position.set(x, seen / Math.tan((ANGLE * Math.PI) / 360), CHEST + 0.1);
     this.camera.lookAt(x, 0, CHEST);
     this.camera.updateProjectionMatrix();
-    this.draw();
+    this.renderer.render(this.scene, this.camera); // at once: another size emptied the canvas
   }
 
   /** The newest of one arm; the other one is not shown. */
