@@ -7,6 +7,7 @@ import shutil
 import pytest
 
 from brachium_fusion.alignment_warnings import warnings_for
+from brachium_viewer.catalogue import catalogue
 from brachium_viewer.web.files import FOLDER, pages
 from brachium_wire import keys
 from brachium_wire.bus import Bus
@@ -63,11 +64,12 @@ def german() -> dict[str, str]:
     return {key: text for key, text in words.items() if " " in key}
 
 
-def test_each_sentence_is_known_with_its_figures(told):
+def test_each_sentence_is_known_with_its_figures_to_pages_and_reports(told):
     filled = [dict(zip(BLANK.findall(key), "QRSTUV", strict=False)) for key in german()]
     texts = [key.format(**values) for key, values in zip(german(), filled, strict=True)]
     wanted = [text.format(**values) for text, values in zip(german().values(), filled, strict=True)]
     assert told("de", texts) == wanted
+    assert [catalogue("de").told(text) for text in texts] == wanted
 
 
 def test_blanks_are_said_in_the_language_too(told):
