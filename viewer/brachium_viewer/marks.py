@@ -12,6 +12,7 @@ from brachium_wire.messages import Event
 Mode = Literal["active", "assisted", "passive"]
 When = Literal["before", "after"]
 Ended = Literal["done", "stopped", "patient-stop"]
+StopReason = Literal["pain", "tired", "dizzy", "other"]
 
 
 class Mark(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True, forbid_unknown_fields=False):
@@ -61,7 +62,7 @@ class Effort(Mark, frozen=True, kw_only=True):
 class PatientStop(Mark, frozen=True, kw_only=True):
     """The patient stopped."""
 
-    reason: Literal["pain", "tired", "dizzy", "other"] = "other"
+    reason: StopReason = "other"
 
 
 class Note(Mark, frozen=True, kw_only=True):

@@ -30,6 +30,9 @@ def write_session(path: Path, origin: Any = "worn", top_deg: float = 100.0) -> P
     one.mark(marks.ExerciseBegins(exercise="wrist-flexion", side="right"))
     one.move(2, 50.0)
     one.mark(marks.ExerciseEnds(reason="patient-stop"))
+    one.mark(marks.PatientStop())
+    one.now_s += 3.0
+    one.mark(marks.PatientStop(reason="dizzy"))
     one.status()
     one.mark(marks.Pain(value=5, when="after"))
     return scripts.write(path, [one])  # type: ignore[no-any-return]

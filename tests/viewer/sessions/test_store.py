@@ -118,6 +118,22 @@ def test_a_deletion_leaves_another_recording_whose_name_begins_alike(
         assert {path.name for path in tmp_path.glob("*.mcap")} == {"a.b.mcap"}
 
 
+def test_a_recording_whose_session_nobody_kept_is_found(
+    tmp_path: Path, script: Any, write_session: Any
+) -> None:
+    one = script("p01")
+    one.set(2, 90.0)
+    with Store.open(tmp_path) as store:
+        add(tmp_path, store, [one], write_session)
+        write_session(tmp_path / "b.mcap", [one])
+        kept = {session.recording for session in store.sessions()}
+    message = one.messages[0]
+    with recording.RecordingWriter(tmp_path / "c.mcap") as writer:
+        writer.write(message[1], message[2], 1)
+        writer.tick(10_000_000_000)
+        assert folder.in_no_session(tmp_path, kept) == [tmp_path / "b.mcap"]
+
+
 def test_a_store_that_cannot_be_written_is_not_called_none(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -43,7 +43,7 @@ def done(groups: Sequence[Group]) -> PageTable:
         wanted = sum(one.wanted or 0 for one in group.sets)
         made = len(group.pooled.repetitions)
         goal = group.pooled.goal_deg
-        ended = {words.ENDED[one.ended] for one in group.sets} - {""}
+        ended = {words.ended(one.ended, one.stop_reason) for one in group.sets} - {""}
         seconds = sum(one.to_ns - one.from_ns for one in group.sets) / 1e9
         rows.append(
             [

@@ -7,6 +7,7 @@ from brachium_viewer.metrics.smoothness import CUTOFF_HZ, LDLJ_RATE_HZ
 from brachium_viewer.report import report_tables as tables
 from brachium_viewer.report import words
 from brachium_viewer.report.build import Report
+from brachium_viewer.sessions.from_recording import readable, stops_between_sets
 
 
 def facts(report: Report) -> list[str]:
@@ -19,6 +20,13 @@ def facts(report: Report) -> list[str]:
     if said is not None and said.height_m is not None:
         found.append(f"height {said.height_m:.2f} m")
     return [*found, f"recording {report.session.recording}"]
+
+
+def stops(report: Report) -> list[str]:
+    """Return what the patient stopped while no set ran, one line each."""
+    marks = readable(report.contents.events.get(report.session.subject, ()))
+    found = stops_between_sets(marks, report.session.sets)
+    return [f"stopped by the patient between sets: {words.STOP_REASONS[reason]}" for reason in found]
 
 
 def how_zero_was_set(report: Report) -> str:

@@ -46,6 +46,17 @@ FORWARD: Mapping[str, str] = {
     "none": "not known: headings are assumed",
 }
 ENDED: Mapping[str, str] = {"done": "", "stopped": "stopped", "patient-stop": "stopped by the patient"}
+STOP_REASONS: Mapping[str, str] = {
+    "pain": "pain",
+    "tired": "tired",
+    "dizzy": "dizzy",
+    "other": "another reason",
+}
+
+
+def ended(how: str, reason: str = "") -> str:
+    """Return how a set ended, with the patient's reason where they gave one; empty when it was done."""
+    return f"stopped by the patient: {STOP_REASONS[reason]}" if reason else ENDED[how]
 
 
 def exercise(name: str) -> str:

@@ -1,7 +1,7 @@
 """The recordings of a store's folder: whose they are, and how one person is taken out of them."""
 
 import os
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from pathlib import Path
 
 from brachium_viewer.sessions.records import StoreError
@@ -54,6 +54,12 @@ def beside(path: Path) -> list[Path]:
     """
     made = (other for other in path.parent.glob(f"{path.stem}.*") if other.suffix != path.suffix)
     return sorted(other for other in made if other.is_file())
+
+
+def in_no_session(folder: Path, known: Collection[str]) -> list[Path]:
+    """Return the recordings that are none of the `known` names and that nobody writes: their server was ended
+    before it could keep their session, or they were never meant to be one."""
+    return [p for p in recordings(folder) if p.name not in known and not recording.is_being_written(p)]
 
 
 def copy_of(source: Path, target: Path, subject: str, *, without: bool) -> None:

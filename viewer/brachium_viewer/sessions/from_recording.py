@@ -1,8 +1,9 @@
 """A recording's marks turned into sets, each with its measures."""
 
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Literal
 
 import msgspec
 import numpy as np
@@ -20,6 +21,8 @@ from brachium_viewer.marks import (
     ExerciseEnds,
     Mark,
     Pain,
+    PatientStop,
+    StopReason,
     read,
 )
 from brachium_viewer.metrics.arm_motion import ArmMotion, arm_motion
@@ -37,6 +40,7 @@ class Span:
     to_ns: int
     ended: Ended
     donning: int
+    stop_reason: StopReason | Literal[""] = ""
 
 
 def session_from_recording(
@@ -120,28 +124,49 @@ def readable(events: Iterable[Event]) -> list[tuple[int, Mark]]:
 
 
 def spans(marks: Iterable[tuple[int, Mark]], end_ns: int) -> list[Span]:
-    """Return the sets: from each begin to its end, to the next begin of the same arm, or to `end_ns`."""
+    """Return the sets: from each begin to its end, to the next begin of the same arm, or to `end_ns`.
+
+    A patient's stop ends what runs. Its reason is asked for afterwards: the last one before the next begin
+    counts.
+    """
     found: list[Span] = []
+    stopped: list[int] = []
     running: dict[str, tuple[ExerciseBegins, int, int]] = {}
     donned = 0
 
-    def close(side: str, at: int, how: Ended) -> None:
-        begins, from_ns, donning = running.pop(side)
-        found.append(Span(begins=begins, from_ns=from_ns, to_ns=at, ended=how, donning=donning))
+    def close(sides: Iterable[str], at: int, how: Ended) -> list[int]:
+        first = len(found)
+        for side in list(sides):
+            begins, from_ns, donning = running.pop(side)
+            found.append(Span(begins=begins, from_ns=from_ns, to_ns=at, ended=how, donning=donning))
+        return list(range(first, len(found)))
 
     for at, mark in marks:
         if isinstance(mark, ExerciseBegins):
-            if mark.side in running:
-                close(mark.side, at, "done")
-            running[mark.side] = (mark, at, donned)
+            close([mark.side] if mark.side in running else [], at, "done")
+            running[mark.side], stopped = (mark, at, donned), []
         elif isinstance(mark, ExerciseEnds):
-            for side in list(running):
-                close(side, at, mark.reason)
+            closed = close(running, at, mark.reason)
+            stopped = closed if mark.reason == "patient-stop" and closed else stopped
+        elif isinstance(mark, PatientStop):
+            stopped = close(running, at, "patient-stop") or stopped
+            for i in stopped:
+                found[i] = replace(found[i], stop_reason=mark.reason)
         elif isinstance(mark, Donning):
             donned += 1
-    for side in list(running):
-        close(side, end_ns, "stopped")
+    close(running, end_ns, "stopped")
     return sorted(found, key=lambda span: span.from_ns)
+
+
+def stops_between_sets(marks: Iterable[tuple[int, Mark]], sets: Sequence[SetRecord]) -> list[StopReason]:
+    """Return the reasons of the patient's stops that ended no set, the last one after each set."""
+    found: dict[int, StopReason] = {}
+    for at, mark in marks:
+        if isinstance(mark, PatientStop):
+            before = max((one for one in sets if one.from_ns < at), key=lambda one: one.to_ns, default=None)
+            if before is None or before.ended != "patient-stop":
+                found[0 if before is None else before.to_ns] = mark.reason
+    return list(found.values())
 
 
 def origin(contents: Contents, subject: str) -> Origin:
@@ -197,6 +222,7 @@ def _set(span: Span, motion: ArmMotion, zero: int) -> SetRecord:
         measures=set_measures(part, exercise(begins.exercise), goal_deg=begins.goal_deg, mode=begins.mode),
         donning=span.donning,
         ended=span.ended,
+        stop_reason=span.stop_reason,
         limit_deg=begins.limit_deg,
         wanted=begins.repetitions,
     )

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any, Literal
 
 from brachium_body.segments import Side
-from brachium_viewer.marks import Ended, When
+from brachium_viewer.marks import Ended, StopReason, When
 from brachium_viewer.metrics.set_measures import SetMeasures
 from brachium_wire.messages import Origin
 
@@ -53,6 +53,8 @@ class SetRecord:
     donning: int = 0
     """How often the sensors had been put on anew in this session before the set."""
     ended: Ended = "done"
+    stop_reason: StopReason | Literal[""] = ""
+    """The patient's, of a set that they stopped; empty when they gave none."""
     limit_deg: float | None = None
     wanted: int | None = None
     """Repetitions that were asked for."""
