@@ -7,11 +7,14 @@ brachium web --sessions sessions
 """
 
 import argparse
+import logging
 import os
 from pathlib import Path
 
 from brachium.option_types import folder, port_or_any
 from brachium.shell import add_network, serve
+
+log = logging.getLogger(__name__)
 
 PASSWORD_VARIABLE = "BRACHIUM_WEB_PASSWORD"
 """Environment variable: a command line would show it to every user of the machine."""
@@ -37,11 +40,21 @@ def configure(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Start the server."""
     from brachium_nodes.listening import listening_address
+    from brachium_viewer.sessions.folder import in_no_session
     from brachium_viewer.sessions.store import Store
     from brachium_viewer.web import server
 
     bind = listening_address("127.0.0.1" if args.bind == "localhost" else args.bind)
-    Store.open(args.sessions).close()  # refused now, and not when a session is to be kept
+    with Store.open(args.sessions) as store:  # refused now, and not when a session is to be kept
+        loose = in_no_session(args.sessions, {one.recording for one in store.sessions()})
+    if loose:
+        log.warning(
+            "%s recording(s) here are in no history, last %s; to keep one: brachium sessions add %s --dir %s",
+            len(loose),
+            loose[-1].name,
+            loose[-1],
+            args.sessions,
+        )
     settings = server.WebSettings(
         endpoint=args.endpoint,
         room=args.room,

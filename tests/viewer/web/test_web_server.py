@@ -185,8 +185,8 @@ def test_the_door_over_http(serve_pages, router_endpoint, tmp_path):
                 assert '"kind":"hello"' in (await screen.receive()).data
         async with aiohttp.ClientSession(address) as second:
             assert (await second.post("/door", data=code, headers=ours)).status == 403  # a code works once
-            for _ in range(2):
-                await second.post("/door", data="wrong", headers=ours)
+            for wrong in (b"no text \xff\xfe", "wrong"):
+                assert (await second.post("/door", data=wrong, headers=ours)).status == 403
             waits = await second.post("/door", data=serving.codes[-1], headers=ours)
             assert waits.status == 429
             assert int(waits.headers["Retry-After"]) >= 1

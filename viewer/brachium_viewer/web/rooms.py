@@ -126,7 +126,7 @@ class Rooms:
         """Answer who says a word at the door: 204 and a key, 403 for a wrong word, 429 to who must wait."""
         if not doors.same_origin(request.headers.get("Origin"), request.host, self._hosts):
             raise web.HTTPForbidden(reason="not from one of our pages")
-        word = (await request.text())[:200]
+        word = (await request.read()).decode("utf-8", "replace")[:200]
         if self._door is None:
             return web.Response(status=204)
         try:
