@@ -9,6 +9,7 @@ from typing import get_args
 import pytest
 
 import brachium_viewer
+import brachium_wire
 from brachium_body.segments import SEGMENTS
 from brachium_viewer import catalogue as c
 from brachium_viewer.exercises import EXERCISES, PLANES_DEG
@@ -22,6 +23,7 @@ SOURCES = [
     *(VIEWER / "metrics" / f"{name}.py" for name in ("measure", "repetition_measures", "set_measures")),
     VIEWER / "metrics" / "both_arms.py",
     VIEWER / "page_template.py",
+    Path(brachium_wire.__file__).parent / "reading.py",
 ]
 OTHERS = c.LANGUAGES[1:]
 BLANK = re.compile(r"\{[^{}]*\}")
@@ -31,6 +33,13 @@ ENGLISH = {"the", "of", "is", "and", "not", "with", "by", "for", "to", "from", "
 PROGRAM = {
     "sets of one exercise by one arm in one mode can be taken together",  # of what a program does wrongly
     "a page needs Jinja2: pip install 'brachium[report]'",  # of what is not installed
+    "a block's check sum is another",
+    "a record is longer than its block",
+    "the file ends with something else",
+    "the file ends within a record",
+    "{}: a recording cut before its first message; nothing can be read",
+    "{}: an MCAP file of another program (profile {}), not a recording",
+    "{}: not a recording (an MCAP file); made by: brachium record",  # of a file that gives no report
 }
 MADE = {
     "Session of {}, {}",
@@ -149,6 +158,8 @@ def test_another_language_is_refused_with_those_that_are_there():
         ("range of 2 of 9 repetitions (reaching, left, assisted)",
          "Umfang von 2 von 9 Wiederholungen (Nach vorn greifen, links, unterstützt)"),
         ("-3.5 (85 %)", "-3,5 (85 %)"),
+        ("/x/a.mcap: not closed: read up to the cut; 2 damaged blocks left out",
+         "/x/a.mcap: nicht geschlossen: bis zum Abbruch gelesen; 2 beschädigte Blöcke ausgelassen"),
         ("left out: 3 messages malformed, 2 messages wrong_type",
          "ausgelassen: 3 Nachrichten (malformed), 2 Nachrichten (wrong_type)"),
         ("a node that is called to", "a node that is called to"),
