@@ -22,6 +22,8 @@ BESIDE_IN = 4.0 / 72
 DIGIT_IN = 0.64 * NUMBERS / 72
 MARGIN = 0.05
 """Of what is shown, around it."""
+LEAST = 2.0
+"""A panel spans at least two degrees or centimetres: stillness is to look still, and has whole numbers."""
 
 Span = tuple[float, float]
 
@@ -133,9 +135,9 @@ def reach(values: Iterable[Floats]) -> Span:
     every = np.concatenate([np.ravel(one) for one in values])
     every = every[np.isfinite(every)]
     if not every.size:
-        return 0.0, 1.0
+        return 0.0, LEAST
     low, high = float(every.min()), float(every.max())
-    margin = max(MARGIN * (high - low), 0.5e-3 * max(abs(low), abs(high), 1.0))
+    margin = max(MARGIN * (high - low), 0.5 * (LEAST - (high - low)))
     return low - margin, high + margin
 
 
