@@ -51,6 +51,7 @@ class Network:
         self.endpoint = f"tcp/127.0.0.1:{free_port()}"
         self.gateway, self.web = free_port(), free_port()
         self.address = f"http://127.0.0.1:{self.web}"
+        self.room = ROOM
         self._network = ["--room", ROOM, "--endpoint", self.endpoint]
 
     def start(self) -> None:
@@ -63,10 +64,10 @@ class Network:
             "router": ["router", "--room", ROOM, "--port", port],
             "fuse": ["fuse", *self._network],
             "gateway": ["gateway", *self._network, "--port", str(self.gateway), "--site", str(site)],
-            "web": self.web_words(),
         }
         for name, words in services.items():
             self.processes.start(name, words, stderr=self.folder / f"{name}.err")
+        self.start_web()
         with Bus.open(self.endpoint, timeout_s=UP_S) as bus:
             wanted = {"gateway", "fusion", "web"}
             until(
@@ -79,16 +80,23 @@ class Network:
                 )
             )
 
-    def web_words(self) -> list[str]:
+    def start_web(self) -> None:
         folder = ["--sessions", str(self.folder / "sessions")]
-        return ["web", *self._network, "--port", str(self.web), "--no-password", *folder]
+        words = ["web", *self._network, "--port", str(self.web), "--no-password", *folder]
+        self.processes.start("web", words, stderr=self.folder / "web.err")
+
+    def kill_web(self) -> None:
+        process = self.processes.children["web"].process
+        assert process is not None
+        process.kill()
+        process.wait()
 
     @contextmanager
-    def wearer(self, exercise: str = "elbow-flexion") -> Iterator[None]:
-        """Somebody who stands for a while, and then does an exercise for ever."""
+    def wearer(self, exercise: str = "elbow-flexion", routine: str = "standing") -> Iterator[None]:
+        """Somebody who stands for a while, or does another routine, and then an exercise for ever."""
         gateway = f"ws://127.0.0.1:{self.gateway}/node"
         way = ["--gateway", gateway, "--token-file", str(self.folder / "token")]
-        words = ["emulate", *self._network, *way, "--routine", "standing", "--exercise", exercise]
+        words = ["emulate", *self._network, *way, "--routine", routine, "--exercise", exercise]
         self.processes.start("emulate", words, stderr=self.folder / "emulate.err")
         try:
             yield
@@ -138,13 +146,12 @@ class Screen:
         self.steps = 0
 
     def _listen(self, page: Any) -> None:
-        page.on(
-            "console", lambda m: self.complaints.append(m.text) if m.type in ("error", "warning") else None
-        )
+        page.on("console", self._console)
         page.on("pageerror", lambda error: self.complaints.append(str(error)))
 
     def _console(self, message: Any) -> None:
-        if message.type in ("error", "warning"):
+        """Keep what is said of the page, not that drawing without a graphics card is slow."""
+        if message.type in ("error", "warning") and "GL Driver Message" not in message.text:
             self.complaints.append(message.text)
 
     def _answered(self, response: Any) -> None:
@@ -201,10 +208,17 @@ class Screen:
             for node in one["nodes"][:3]
         ]
 
-    def inspect(self, step: str, *, target_px: int | None = None, axe: bool = True) -> None:
+    def inspect(
+        self,
+        step: str,
+        *,
+        target_px: int | None = None,
+        axe: bool = True,
+        dresses: tuple[tuple[str, str, int], ...] = DRESSES,
+    ) -> None:
         """Look at the page in both languages, light and dark, at the size of letters and at twice that."""
         found = []
-        for language, theme, percent in DRESSES:
+        for language, theme, percent in dresses:
             self.dress(language, theme, percent)
             dressed = f"{step} {language} {theme} {percent} %"
             found += [f"{dressed}: {fault}" for fault in self.faults(target_px)]

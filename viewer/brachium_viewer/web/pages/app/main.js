@@ -17,6 +17,8 @@ import { language, say, speak, told } from "./words.js";
 let state = null;
 let set = 1;
 let up = false;
+let again = false; // the next state is the first that this line tells
+let next = null; // the button that gets the focus as soon as it is there
 
 await speak();
 const picture = new Picture($("picture"));
@@ -29,6 +31,7 @@ const people = new People(link);
 showRatings(link);
 
 function hello(message) {
+  again = true;
   plan.offer(message.exercises);
   meant();
 }
@@ -66,6 +69,8 @@ function news(message) {
     numbers.ended = null;
     clearRatings();
   }
+  if (again && state?.set && !message.set) tell($("action-said"), { ok: false, reason: say("line.anew") });
+  again = false;
   state = message;
   showHeadline(state, up);
   showSensors(state);
@@ -76,10 +81,17 @@ function news(message) {
   $("origin").textContent = say(`origin.${state.origin}`);
   $("start").hidden = state.set !== null;
   $("stop").hidden = state.set === null;
+  lead(next);
   $("start").disabled = state.sides.length === 0;
   recording();
   history();
   meant();
+}
+
+/** Give a button the focus, now or when the state shows it: who has no pointer goes on from there. */
+function lead(button) {
+  next = button?.hidden ? button : null;
+  if (button && !next) button.focus({ preventScroll: true });
 }
 
 function recording() {
@@ -112,7 +124,7 @@ $("start").addEventListener("click", async () => {
   numbers.ended = null;
   tell($("action-said"), answer);
   if (!answer.ok) return;
-  $("stop").focus();
+  lead($("stop"));
   scrollTo({ top: 0 }); // the picture and the numbers are what is looked at now
 });
 
@@ -122,6 +134,7 @@ $("stop").addEventListener("click", async () => {
   const last = set >= plan.words.sets;
   tell($("action-said"), answer, say("set.done", { count: answer.data?.set?.count ?? 0 }));
   if (answer.ok) set = last ? 1 : set + 1;
+  if (answer.ok) lead($("start"));
   if (answer.ok && last) tabs.show($("tab-finish"));
   meant();
 });
