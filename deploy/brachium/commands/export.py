@@ -10,6 +10,7 @@ import os
 from pathlib import Path
 
 from brachium.option_types import LONGEST_S, real
+from brachium.output_file import spare
 from brachium.shell import Usage, add_json, print_json
 
 FORMATS = ("csv", "parquet", "sto", "mot", "trc", "c3d", "bvh", "rrd", "motion-bids")
@@ -78,8 +79,7 @@ def run(args: argparse.Namespace) -> int:
         )
     if args.out.is_dir() != (wish.to == "motion-bids") and args.out.exists():
         raise Usage(f"--out {args.out}: --to {wish.to} writes a {'folder' if args.out.is_file() else 'file'}")
-    if args.out.exists() and args.input.exists() and args.out.samefile(args.input):
-        raise Usage(f"--out {args.out}: is the input itself; choose another name")
+    spare(args.input, args.out)
     files = formats.export(table_of(args.input, args.subject), args.out, wish, f"{version()}, export")
     if args.json:
         print_json({"files": [str(path) for path in files]})

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from brachium.option_types import real
+from brachium.output_file import spare
 from brachium.shell import Usage, add_json, print_json
 
 if TYPE_CHECKING:
@@ -66,6 +67,7 @@ def run(args: argparse.Namespace) -> int:
         raise Usage(f"--filter {args.filter!r} is not known; choose one of {known}")
     if args.out is not None:
         _check_writable(args.out)
+        spare(args.input, args.out)
     report = solve.run(
         solve.SolveSettings(
             input=args.input,
