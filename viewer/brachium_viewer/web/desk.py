@@ -35,6 +35,8 @@ class Desk:
     def __init__(self, bus: Bus, state: PageState, sessions: SessionDesk, clock: HostClock) -> None:
         self._bus, self._state, self._sessions, self._clock = bus, state, sessions, clock
         self._calibrating = False
+        self._recording = asyncio.Lock()
+        """Held by who begins, marks or ends: nothing is put into a recording that another closes."""
 
     async def do(self, text: str) -> Json:
         """Return the answer to one message of a page."""
@@ -68,7 +70,8 @@ class Desk:
             case r.WearCheck():
                 return await self._wear_check(subject)
             case r.Exercise():
-                return await self._begin(subject, asked)
+                async with self._recording:
+                    return await self._begin(subject, asked)
             case r.Stop():
                 return await self._end(subject, "stopped")
             case r.PatientStop():
@@ -102,6 +105,8 @@ class Desk:
         return {"subject": asked.subject}
 
     async def _calibrate(self, subject: str, verb: str, arguments: Json) -> Json:
+        if self._state.running is not None:
+            raise Refused("a set is running: stop it first")  # its angles would jump
         if self._calibrating:
             raise Refused("a calibration is running: wait until it is over")
         self._calibrating = True
@@ -158,14 +163,17 @@ class Desk:
         return {"set": ended}
 
     async def _finish(self, subject: str, language: str) -> Json:
-        if self._state.running is not None:
-            await self._end(subject, "stopped")
-        await asyncio.sleep(HEARD_S)  # what was said last is still on its way to the recording
-        return await self._sessions.finish(subject, language)
+        async with self._recording:
+            if self._state.running is not None:
+                await self._end(subject, "stopped")
+            await asyncio.sleep(HEARD_S)  # what was said last is still on its way to the recording
+            closed = await self._sessions.end()
+        return await self._sessions.keep(closed, subject, language)
 
     async def _mark(self, subject: str, mark: marks.Mark, text: str = "") -> Json:
-        await self._sessions.begin(self._bus, subject)
-        self._put(subject, mark, self._instant_ns(), text)
+        async with self._recording:
+            await self._sessions.begin(self._bus, subject)
+            self._put(subject, mark, self._instant_ns(), text)
         return {}
 
     def _put(self, subject: str, mark: marks.Mark, now_ns: int, text: str = "") -> None:

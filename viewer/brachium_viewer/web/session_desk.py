@@ -40,7 +40,6 @@ class SessionDesk:
         self._thread: threading.Thread | None = None
         self._closed: recorder.RecordReport | None = None
         self._begun_s = 0.0
-        self._beginning = asyncio.Lock()
         self._looking: set[asyncio.Task[None]] = set()
         self._history: tuple[str | None, list[Json]] = (None, [])
         self.subject: str | None = None
@@ -51,31 +50,34 @@ class SessionDesk:
     async def begin(self, bus: Bus, subject: str, *, anew: bool = False) -> None:
         """Record from now on, if not yet. Raises NoRecording.
 
-        Where a recording stopped by itself, only `anew` begins the next one: whoever asks has seen the alarm.
+        One call at a time. Where a recording stopped by itself, only `anew` begins the next one: whoever
+        asks has seen the alarm.
         """
-        async with self._beginning:
-            if self._thread is not None and self.failure:
-                if not anew:
-                    raise NoRecording(self.failure)
-                await asyncio.to_thread(self.close)
-                if self._closed is not None:
-                    self._later(self._keep_aside(self._closed.path, subject))
-            if self._thread is None:
-                await asyncio.to_thread(self._start, bus, subject)
+        if self._thread is not None and self.failure:
+            if not anew:
+                raise NoRecording(self.failure)
+            await asyncio.to_thread(self.close)
+            if self._closed is not None:
+                self._later(self._keep_aside(self._closed.path, subject))
+        if self._thread is None:
+            await asyncio.to_thread(self._start, bus, subject)
 
-    async def finish(self, subject: str, language: str) -> Json:
-        """Close the recording, keep its session, make its report. Raises NoRecording when there was none."""
+    async def end(self) -> recorder.RecordReport:
+        """Close the recording. Raises NoRecording when there was none."""
         if self._thread is None:
             raise NoRecording("nothing was recorded yet: start an exercise first")
         await asyncio.to_thread(self.close)
         if self._closed is None:
             raise NoRecording(self.failure or "the recording could not be closed")
-        path = self._closed.path
+        return self._closed
+
+    async def keep(self, closed: recorder.RecordReport, subject: str, language: str) -> Json:
+        """Keep the session of a closed recording and make its report; the next one may run already."""
         try:
-            kept = await asyncio.to_thread(keeping.apart, keeping.keep, path, subject, language)
+            kept = await asyncio.to_thread(keeping.apart, keeping.keep, closed.path, subject, language)
         finally:
             self._history = None, []
-        return {"recording": path.name, "subject": subject, "ended": self._closed.ended, **kept}
+        return {"recording": closed.path.name, "subject": subject, "ended": closed.ended, **kept}
 
     def state(self, subject: str | None) -> Json:
         """Return what a page shows of the recording, of alarms and of what was before."""
