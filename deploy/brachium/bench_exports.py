@@ -20,6 +20,7 @@ from brachium_viewer.export import formats
 from brachium_wire import capture as captures
 from brachium_wire.capture_settings import CalibrationSpans, CaptureSettings
 from brachium_wire.table import Table
+from brachium_wire.tuples import quaternion
 
 Floats = npt.NDArray[np.float64]
 
@@ -65,15 +66,10 @@ def write_capture(folder: Path, exercise: str, level: Level = "ideal") -> None:
             "hand": lengths.hand,
         },
         facing_deg=0.0,
-        mounting={name: _four(s.nominal_mounting) for name, s in made.sensors.items()},
+        mounting={name: quaternion(s.nominal_mounting) for name, s in made.sensors.items()},
         calibration=CalibrationSpans(pose="n-pose", from_s=POSE_S[0], to_s=POSE_S[1]),
     )
     captures.write(folder, settings, segments, "csv")
-
-
-def _four(q: Floats) -> tuple[float, float, float, float]:
-    w, x, y, z = q.tolist()
-    return w, x, y, z
 
 
 def solved(folder: Path) -> Table:

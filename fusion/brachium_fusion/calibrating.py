@@ -14,6 +14,7 @@ from brachium_fusion.timeline import Reading
 from brachium_fusion.track import SegmentTrack
 from brachium_fusion.zero import zeroed
 from brachium_wire.messages import Calibration, Quaternion, Session
+from brachium_wire.tuples import quaternion
 
 Floats = npt.NDArray[np.float64]
 
@@ -180,7 +181,7 @@ class Calibrating:
                 progress=1.0 if state == "done" else progress,
                 reason=reason,
                 forward=alignment.forward,
-                mounting={s: _quaternion(q) for s, q in alignment.mounting.items()},
+                mounting={s: quaternion(q) for s, q in alignment.mounting.items()},
                 scores=alignment.scores,
                 warnings=list(alignment.warnings),
                 refused=dict(refused or {}),
@@ -213,8 +214,3 @@ class Calibrating:
 
 def _array(values: Quaternion | None) -> Floats | None:
     return None if values is None else np.array(values, dtype=np.float64)
-
-
-def _quaternion(q: Floats) -> Quaternion:
-    w, x, y, z = q.tolist()
-    return (w, x, y, z)

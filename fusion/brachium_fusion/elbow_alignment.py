@@ -23,6 +23,7 @@ from brachium_fusion.joint_equations import AxisPriors, HeadingPrior
 from brachium_fusion.joint_motion import JointMotion, SensorMotion, joint_motion
 from brachium_fusion.segment_frames import ElbowFrames, ElbowPose, elbow_angles, elbow_frames, excursion_deg
 from brachium_fusion.segment_records import leaves_open
+from brachium_wire.tuples import vector
 
 Floats = npt.NDArray[np.float64]
 
@@ -187,8 +188,8 @@ def _result(
     joint = JointAlignment(
         near=near,
         far=far,
-        axis_near=_vector(frames.axis_upper),
-        axis_far=_vector(frames.axis_forearm),
+        axis_near=vector(frames.axis_upper),
+        axis_far=vector(frames.axis_forearm),
         carrying_rad=frames.carrying,
         heading_rad=float(rotation.wrap(found.heading_at(pose.time_s))),
         axis_near_sd_rad=found.axis_a_sd,
@@ -233,9 +234,5 @@ def _forearm_axis(pose: ElbowPose, nominal: Floats | None) -> Floats | None:
     return None
 
 
-def _vector(v: Floats) -> tuple[float, float, float]:
-    return (float(v[0]), float(v[1]), float(v[2]))
-
-
 def _lever(lever: Floats, sd: Floats) -> tuple[float, float, float] | None:
-    return _vector(lever) if float(np.linalg.norm(sd)) < LEVER_SD_M else None
+    return vector(lever) if float(np.linalg.norm(sd)) < LEVER_SD_M else None

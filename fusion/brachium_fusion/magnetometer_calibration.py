@@ -6,8 +6,9 @@ The paper's (Tsilomitrou et al. 2021, 4.1) is `mag_min_max`; `mag_ellipsoid` fin
 import numpy as np
 from scipy.optimize import least_squares
 
-from brachium_fusion.sensor_calibration import OUTWARD, Floats, Refused, SensorFit, check_covered, vector
+from brachium_fusion.sensor_calibration import OUTWARD, Floats, Refused, SensorFit, check_covered
 from brachium_wire.messages import SensorCalibration
+from brachium_wire.tuples import vector
 
 MAG_RESIDUAL = 0.06
 """Part of the field, a robust SD: more means that iron or a magnet was near for much of the turning."""

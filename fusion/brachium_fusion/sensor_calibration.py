@@ -12,7 +12,8 @@ import numpy.typing as npt
 from scipy.optimize import least_squares
 
 from brachium_fusion.still_stretches import still_stretches
-from brachium_wire.messages import SensorCalibration, Vector
+from brachium_wire.messages import SensorCalibration
+from brachium_wire.tuples import vector
 
 Floats = npt.NDArray[np.float64]
 
@@ -178,9 +179,3 @@ def check_covered(directions: Floats, to_do: str) -> None:
     both_ends = min(directions.max(axis=0).min(), -directions.min(axis=0).max())
     if least < COVERED or both_ends < OUTWARD:
         raise Refused(f"the directions do not cover all sides: {to_do}")
-
-
-def vector(v: Floats) -> Vector:
-    """Return (3,) as messages have it."""
-    x, y, z = v.tolist()
-    return (x, y, z)

@@ -7,14 +7,14 @@ from dataclasses import dataclass
 from math import pi, sqrt
 
 import numpy as np
-import numpy.typing as npt
 
 from brachium_body import rotation
 from brachium_nodes.mounting import random_turn
 from brachium_nodes.movement import Array
 from brachium_nodes.sensors import FIELD_UT, GRAVITY, LEVELS, Chip, generator
 from brachium_nodes.wearer import WearerSettings
-from brachium_wire.messages import SensorCalibration, Vector
+from brachium_wire.messages import SensorCalibration
+from brachium_wire.tuples import vector
 
 FACE_ERROR_DEG = 1.0
 """3-D rms of the angle by which a face laid down by hand is off."""
@@ -84,10 +84,10 @@ class CalibrationBench:
         chip, c = self.chip, self.chip.calibration
         scale, matrix = np.array(c.accel_scale), np.array(c.mag_matrix)
         return SensorCalibration(
-            gyro_bias=_vector(np.array(c.gyro_bias) + chip.gyro_bias),
-            accel_scale=_vector(scale / chip.accel_factor),
-            accel_bias=_vector(np.array(c.accel_bias) + chip.accel_bias / scale),
-            mag_offset=_vector(np.array(c.mag_offset) + np.linalg.solve(matrix, chip.mag_bias)),
+            gyro_bias=vector(np.array(c.gyro_bias) + chip.gyro_bias),
+            accel_scale=vector(scale / chip.accel_factor),
+            accel_bias=vector(np.array(c.accel_bias) + chip.accel_bias / scale),
+            mag_offset=vector(np.array(c.mag_offset) + np.linalg.solve(matrix, chip.mag_bias)),
             mag_matrix=c.mag_matrix,
         )
 
@@ -127,8 +127,3 @@ def to_up(up: Array) -> Array:
     if np.linalg.norm(axis) < 1e-9:
         return rotation.IDENTITY if cosine > 0.0 else rotation.about(0, pi)
     return rotation.from_rotation_vector(axis / np.linalg.norm(axis) * np.arccos(cosine))
-
-
-def _vector(v: npt.ArrayLike) -> Vector:
-    x, y, z = np.asarray(v, dtype=np.float64).tolist()
-    return (x, y, z)

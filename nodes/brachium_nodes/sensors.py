@@ -15,6 +15,7 @@ import numpy.typing as npt
 
 from brachium_nodes.movement import Array
 from brachium_wire.messages import SensorCalibration, Vector
+from brachium_wire.tuples import vector
 
 Level = Literal["exact", "ideal", "typical", "patient"]
 
@@ -140,10 +141,10 @@ class Chip:
         random, e = generator(seed, segment, "chip"), errors
         soft = e.soft_iron * random.standard_normal((3, 3))
         calibration = SensorCalibration(
-            gyro_bias=_vector(e.gyro_bias_raw * random.standard_normal(3)),
-            accel_scale=_vector(1.0 + e.accel_scale_raw * random.standard_normal(3)),
-            accel_bias=_vector(e.accel_bias_raw * random.standard_normal(3)),
-            mag_offset=_vector(e.hard_iron_raw * random.standard_normal(3)),
+            gyro_bias=vector(e.gyro_bias_raw * random.standard_normal(3)),
+            accel_scale=vector(1.0 + e.accel_scale_raw * random.standard_normal(3)),
+            accel_bias=vector(e.accel_bias_raw * random.standard_normal(3)),
+            mag_offset=vector(e.hard_iron_raw * random.standard_normal(3)),
             mag_matrix=_matrix(np.linalg.inv(np.eye(3) + 0.5 * (soft + soft.T))),
         )
         return cls(
@@ -198,11 +199,6 @@ def _quantised(values: Array, step: float, full_scale: float) -> Array:
     return step * np.round(np.clip(values, -full_scale, full_scale) / step)
 
 
-def _vector(v: npt.ArrayLike) -> Vector:
-    x, y, z = np.asarray(v, dtype=np.float64).tolist()
-    return (x, y, z)
-
-
 def _matrix(m: npt.ArrayLike) -> tuple[Vector, Vector, Vector]:
     x, y, z = np.asarray(m, dtype=np.float64)
-    return (_vector(x), _vector(y), _vector(z))
+    return (vector(x), vector(y), vector(z))

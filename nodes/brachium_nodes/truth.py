@@ -14,7 +14,8 @@ from brachium_body.segments import Segment, Side, arm_segments
 from brachium_nodes.mounting import Worn
 from brachium_nodes.movement import Array
 from brachium_nodes.person import Person
-from brachium_wire.messages import Quaternion, SegmentPose, Skeleton, Vector
+from brachium_wire.messages import SegmentPose, Skeleton
+from brachium_wire.tuples import quaternion, vector
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -94,24 +95,16 @@ def _skeleton(truth: Truth, i: int, angles: Array, side: Side, time_ns: int) -> 
         side=side,
         origin="emulated",
         forward="facing",
-        trunk_from_world=_four(truth.trunk_from_world[i]),
+        trunk_from_world=quaternion(truth.trunk_from_world[i]),
         segments={
             name: SegmentPose(
                 quality="good",
-                world_from_segment=_four(q[i]),
-                world_from_sensor=_four(sensors[name][i]) if name in sensors else None,
+                world_from_segment=quaternion(q[i]),
+                world_from_sensor=quaternion(sensors[name][i]) if name in sensors else None,
             )
             for name, q in truth.world_from_segment.items()
         },
-        positions={name: _three(p[i]) for name, p in truth.positions.items()},
+        positions={name: vector(p[i]) for name, p in truth.positions.items()},
         angles=dict(zip(COLUMNS, angles.tolist(), strict=True)),
-        shoulder_shift=_three(truth.shoulder_shift[i]),
+        shoulder_shift=vector(truth.shoulder_shift[i]),
     )
-
-
-def _three(v: Array) -> Vector:
-    return (float(v[0]), float(v[1]), float(v[2]))
-
-
-def _four(q: Array) -> Quaternion:
-    return (float(q[0]), float(q[1]), float(q[2]), float(q[3]))

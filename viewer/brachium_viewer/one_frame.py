@@ -7,6 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from brachium_body import rotation
+from brachium_wire.tuples import vector
 
 Floats = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]
@@ -97,7 +98,7 @@ def in_one_frame(
             kind=kind,
             turn_deg=None if turn is None else _degrees(turn),
             positions_turn_deg=None if found is None else _degrees(found[0]),
-            positions_shift_m=None if found is None else _vector(found[1]),
+            positions_shift_m=None if found is None else vector(found[1]),
         ),
     )
 
@@ -109,8 +110,3 @@ def _point(numbers: Pairs, stem: str) -> tuple[Floats, Floats]:
 
 def _degrees(turn: Floats) -> float:
     return float(np.degrees(rotation.angle_between(rotation.IDENTITY, turn)))
-
-
-def _vector(v: Floats) -> tuple[float, float, float]:
-    x, y, z = v.tolist()
-    return (x, y, z)

@@ -19,7 +19,8 @@ from brachium_nodes.person import TRANSITION_S, Person
 from brachium_nodes.session import ArmArrays, SensorArrays, SessionArrays, session_arrays
 from brachium_wire import capture as captures
 from brachium_wire.capture_settings import CaptureSettings
-from brachium_wire.messages import Quaternion, Skeleton
+from brachium_wire.messages import Skeleton
+from brachium_wire.tuples import quaternion
 
 Floats = npt.NDArray[np.float64]
 
@@ -114,7 +115,7 @@ def capture_settings(made: Emulated) -> CaptureSettings:
             "hand": lengths.hand,
         },
         facing_deg=0.0 if trial.magnetometer else None,
-        mounting={name: _four(s.nominal_mounting) for name, s in made.sensors().items()},
+        mounting={name: quaternion(s.nominal_mounting) for name, s in made.sensors().items()},
         calibration=spans(made.session.spans),
         joint=joints(made.sensors()),
         assumed_angles_deg=dict(trial.assumed_angles_deg),
@@ -153,8 +154,3 @@ def estimate(
     return Estimate(
         world_from_segment=segments, positions=positions, angles=angles, shift=shift, warnings=warnings
     )
-
-
-def _four(q: Floats) -> Quaternion:
-    w, x, y, z = q.tolist()
-    return (w, x, y, z)

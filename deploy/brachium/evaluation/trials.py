@@ -18,6 +18,7 @@ from brachium_nodes.wearer import WearerSettings
 from brachium_nodes.wearing import Wearing
 from brachium_wire.capture_settings import CalibrationSpans, Functional, Joint, JointName, Motion, Pose
 from brachium_wire.messages import Vector
+from brachium_wire.tuples import vector
 
 Floats = npt.NDArray[np.float64]
 
@@ -126,13 +127,8 @@ def joints(sensors: Mapping[Segment, SensorArrays]) -> dict[JointName, Joint]:
     known: tuple[tuple[JointName, int], ...] = (("shoulder", 3), ("elbow", 2), ("wrist", 2))
     for joint, axes in known:
         centres: dict[Segment, Vector] = {
-            name: _vector(sensor.levers[joint]) for name, sensor in sensors.items() if joint in sensor.levers
+            name: vector(sensor.levers[joint]) for name, sensor in sensors.items() if joint in sensor.levers
         }
         if len(centres) > 1 or (joint == "shoulder" and centres):
             found[joint] = Joint(axes=axes, centre_from=centres)
     return found
-
-
-def _vector(v: Floats) -> Vector:
-    x, y, z = v.tolist()
-    return (x, y, z)

@@ -15,6 +15,7 @@ import numpy.typing as npt
 
 from brachium_nodes.shimmer.protocol import Accelerometer, Inquiry, Kind
 from brachium_wire.messages import SensorCalibration, Vector
+from brachium_wire.tuples import vector
 
 Floats = npt.NDArray[np.float64]
 
@@ -135,11 +136,11 @@ def conversions(inquiry: Inquiry, blocks: bytes, accelerometer: Accelerometer, *
     if (block := found["mag"]) is not None:
         shape = block.case_from_steps @ np.linalg.inv(usual["mag"].case_from_steps)
         shape = shape / np.cbrt(abs(np.linalg.det(shape)))
-        x, y, z = (_vector(row) for row in shape)
+        x, y, z = (vector(row) for row in shape)
         calibration = SensorCalibration(
             gyro_bias=gyro_bias,
             accel_bias=accel_bias,
-            mag_offset=_vector(mag(block.offset[None])[0]),
+            mag_offset=vector(mag(block.offset[None])[0]),
             mag_matrix=(x, y, z),
         )
     return Converted(acc, gyr, mag, calibration, tuple(missing))
@@ -150,9 +151,4 @@ def _applied(block: Block | None, usual: Block, unit: float) -> tuple[Conversion
     if block is None:
         return Conversion(usual.offset, unit * usual.case_from_steps), None
     conversion = Conversion(usual.offset, unit * block.case_from_steps)
-    return conversion, _vector(conversion(block.offset[None])[0])
-
-
-def _vector(v: Floats) -> Vector:
-    x, y, z = v.tolist()
-    return (x, y, z)
+    return conversion, vector(conversion(block.offset[None])[0])
