@@ -11,6 +11,9 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check -q
 PARTS := body wire nodes router fusion viewer deploy
 ARGS ?=
 
+# Tests start hundreds of processes: they share what is compiled once.
+unexport PYTHONDONTWRITEBYTECODE
+
 .PHONY: demo test check pytest prove lock wheel test-wheel clean
 .DEFAULT_GOAL := demo
 
@@ -27,7 +30,7 @@ check: $(VENV)/dev.stamp
 	$(BIN)/lint-imports
 
 pytest: $(VENV)/dev.stamp
-	$(BIN)/python -m pytest -n 2 --dist loadfile $(ARGS)
+	$(BIN)/python -m pytest -n 3 --dist loadfile --no-loadscope-reorder $(ARGS)
 
 prove: $(VENV)/demo.stamp
 	$(BIN)/brachium prove --out docs/figures $(ARGS)
