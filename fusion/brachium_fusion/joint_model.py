@@ -150,11 +150,6 @@ class JointState:
         return self.others[:, 3:6]
 
     @property
-    def acc_bias(self) -> Floats:
-        """(2, 3) m/s^2."""
-        return self.others[:, 6:9]
-
-    @property
     def lever(self) -> Floats:
         """(2, 3) m."""
         return self.others[:, 9:12]

@@ -12,7 +12,6 @@ from brachium_nodes.sensors import Level
 
 SEEDS = (1, 2, 3)
 """Of the emulated wearers, where none are given: figures are the median over them."""
-QUICK_SEEDS = (1,)
 DEFAULT_LEVELS: tuple[Level, ...] = ("ideal", "typical")
 
 

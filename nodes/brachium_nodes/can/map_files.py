@@ -2,7 +2,7 @@
 
 from functools import cache
 from pathlib import Path
-from typing import Any, Literal, get_args
+from typing import Any, Literal
 
 import msgspec
 
@@ -11,7 +11,6 @@ from brachium_wire.messages import Quaternion
 
 SHIPPED = Path(__file__).parent / "maps"
 Quantity = Literal["acceleration", "angular_rate", "field", "quaternion"]
-QUANTITIES: tuple[Quantity, ...] = get_args(Quantity)
 
 
 class Signals(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):

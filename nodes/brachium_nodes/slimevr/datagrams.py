@@ -34,7 +34,6 @@ MAX_VOLTS = 20.0
 MAX_ACCELERATION = 500.0
 _HEADER = Struct(">IQ")
 _Q15 = 1.0 / 32768.0
-_PACKED_ACCELERATION = 1.0 / 128.0
 
 
 class _Refused(Exception):

@@ -2,12 +2,11 @@
 
 from collections.abc import Sequence
 from types import ModuleType
-from typing import Any, Literal, get_args
+from typing import Any, Literal
 
 from brachium_viewer.lsl.streams import OWN, Rows, Stream
 
 Scope = Literal["machine", "link", "site"]
-SCOPES: tuple[Scope, ...] = get_args(Scope)
 """Who finds the streams: programs on this machine, in this subnet, or as far as routers pass multicast on."""
 
 
