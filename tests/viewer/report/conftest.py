@@ -25,7 +25,7 @@ def write_session(path: Path, origin: Any = "worn", top_deg: float = 100.0) -> P
     one.set(5, top_deg, goal_deg=90.0, repetitions=10)
     one.mark(marks.Donning())
     one.set(5, top_deg)
-    one.set(2, top_deg + 8.0, mode="passive")
+    one.set(2, top_deg + 8.0, mode="passive", limit_deg=top_deg)
     one.set(2, top_deg - 20.0, side="left")
     one.mark(marks.ExerciseBegins(exercise="wrist-flexion", side="right"))
     one.move(2, 50.0)

@@ -106,6 +106,7 @@ def test_it_tells_what_was_done_and_what_it_is_not(of_worn: tuple[Page, str, pag
         "Zero in pose n-pose",
         "their axis points to the right",
         "heading drifts",
+        "limit 100 deg: passed in 2 of 2",
         "stopped by the patient: dizzy",
         "shoulder or trunk movement",
         "AAOS reference",

@@ -6,7 +6,7 @@ from datetime import UTC, datetime
 from brachium_viewer.figures import SegmentFigures
 from brachium_viewer.metrics.both_arms import Components
 from brachium_viewer.metrics.measure import Measure
-from brachium_viewer.metrics.set_measures import FEW
+from brachium_viewer.metrics.set_measures import FEW, values
 from brachium_viewer.page_sections import PageTable
 from brachium_viewer.report import words
 from brachium_viewer.report.groups import Group, Past, Symmetry
@@ -55,12 +55,25 @@ def done(groups: Sequence[Group]) -> PageTable:
                 NONE if goal is None else f"{goal:.0f}",
                 number(group.pooled.best_peak, 0),
                 f"{seconds / 60:.1f}",
-                ", ".join(sorted(ended)),
+                ", ".join([*_limits(group), *sorted(ended)]),
             ]
         )
     head = ["", "mode", "sets", "repetitions", "tries", "goal, deg", "farthest, deg", "min", ""]
     note = "A try is a movement that went less than half as far as the others; it is no repetition."
     return PageTable("What was done", head, rows, note)
+
+
+def _limits(group: Group) -> list[str]:
+    """Return of each limit that was set how many repetitions went beyond it."""
+    sign = 1.0 if group.exercise.rises else -1.0
+    tops: dict[float, list[float]] = {}
+    for one in group.sets:
+        if one.limit_deg is not None:
+            tops.setdefault(one.limit_deg, []).extend(values(one.measures.repetitions, "peak"))
+    return [
+        f"limit {limit:.0f} deg: passed in {sum(sign * top > sign * limit for top in found)} of {len(found)}"
+        for limit, found in sorted(tops.items())
+    ]
 
 
 def measures(groups: Sequence[Group]) -> PageTable:
