@@ -1,6 +1,7 @@
 """The report and the sessions from the command line, on a session that was emulated and solved."""
 
 import json
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -9,6 +10,7 @@ import pytest
 from brachium import emulated_session
 from brachium.__main__ import main
 from brachium_viewer.contents import load
+from brachium_wire.recording import RecordingWriter, read
 
 
 @pytest.fixture(scope="module")
@@ -50,6 +52,19 @@ def test_report_writes_its_page_and_its_table(
     assert page.stat().st_size == found["bytes"]
     lines = [line for line in rows.read_text().splitlines() if not line.startswith("#")]
     assert len(lines) == 1 + found["repetitions"]
+
+
+def test_a_report_that_is_empty_says_why(
+    recording: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], caplog: pytest.LogCaptureFixture
+) -> None:
+    unmarked = tmp_path / "unmarked.mcap"
+    with RecordingWriter(unmarked) as file, read(recording) as messages:
+        for key, payload, log_ns in islice(messages, 500):
+            if not key.endswith(("/event", "/session")):
+                file.write(key, payload, log_ns)
+    found = run(capsys, "report", str(unmarked), "--out", str(tmp_path / "a.html"))
+    assert found["sets"] == 0
+    assert "no exercise was marked" in caplog.text
 
 
 @pytest.mark.parametrize(

@@ -158,11 +158,12 @@ def test_signals_that_wait_are_joined_and_everything_else_is_replaced() -> None:
     assert mailbox.replaced == 0
 
 
-@pytest.mark.network
-def test_a_time_after_the_end_is_said(path: Path) -> None:
-    settings = ViewSettings(web=True, web_port=0, grpc_port=0)
-    with pytest.raises(ViewError, match="choose another --at"):
-        recorded_view.run(path, 100.0, settings, threading.Event())
+def test_a_time_after_the_end_is_said_before_anything_opens(
+    path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(recorded_view, "opened", lambda *_: pytest.fail("a view was opened"))
+    with pytest.raises(ViewError, match=r"no skeletons from 100 s on, it ends at \d+ s; choose another --at"):
+        recorded_view.run(path, 100.0, ViewSettings(web=True), threading.Event())
 
 
 def test_a_time_without_a_recording_is_usage() -> None:

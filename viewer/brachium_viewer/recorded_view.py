@@ -70,6 +70,8 @@ def run(path: Path, at_s: float, settings: ViewSettings, stop: threading.Event) 
     Raises RecordingError, FileNotFoundError, and ViewError as the live view does, or when nothing is there to
     be shown.
     """
+    if at_s > 0.0:
+        _check_begin(path, at_s)
     with ExitStack() as stack:
         messages = stack.enter_context(recording.read(path))
         viewer = opened(stack, settings, stop)[0]
@@ -79,6 +81,20 @@ def run(path: Path, at_s: float, settings: ViewSettings, stop: threading.Event) 
             log.warning("%s", messages.warning)
         while not stop.is_set() and viewer.running():
             stop.wait(0.1)
+
+
+def _check_begin(path: Path, at_s: float) -> None:
+    """Raise ViewError, before anything opens, when no arm is there from `at_s` on."""
+    start_ns, last_s = 0, 0.0
+    with recording.read(path) as messages:
+        for key, _, log_ns in messages:
+            start_ns = start_ns or log_ns
+            last_s = 1e-9 * (log_ns - start_ns)
+            if last_s >= at_s and "/skeleton/" in key:
+                return
+    raise ViewError(
+        f"{path}: no skeletons from {at_s:g} s on, it ends at {last_s:.0f} s; choose another --at"
+    )
 
 
 def _send(drawn: Iterator[Moment], path: Path, viewer: ViewerProcess, stop: threading.Event) -> None:
@@ -98,7 +114,7 @@ def _send(drawn: Iterator[Moment], path: Path, viewer: ViewerProcess, stop: thre
             stream.flush()
     stream.flush()
     if not arms:
-        raise ViewError(f"{path}: no skeletons to show up to its end at {last_s:.0f} s; choose another --at")
+        raise ViewError(f"{path}: no skeletons to show up to its end at {last_s:.0f} s")
     log.info("%s: shown up to its end at %.0f s", path, last_s)
 
 

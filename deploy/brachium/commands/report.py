@@ -4,10 +4,13 @@ brachium report p01.mcap --out p01.html --csv p01.csv --sessions recordings
 """
 
 import argparse
+import logging
 import os
 from pathlib import Path
 
 from brachium.shell import Usage, add_json, print_json
+
+_log = logging.getLogger(__name__)
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
@@ -23,6 +26,9 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--language", default="en", metavar="CODE", help="of the page: en (default) or de")
     parser.add_argument("--side", choices=("right", "left"), help="by which arm, in one without marks")
     add_json(parser)
+
+
+NOTHING = "the report is empty: no exercise was marked or is named that it knows; give --exercise and --side"
 
 
 def run(args: argparse.Namespace) -> int:
@@ -55,6 +61,8 @@ def run(args: argparse.Namespace) -> int:
             language=args.language,
         )
     )
+    if not found.sets and begins is None:
+        _log.warning("%s: %s", args.recording, NOTHING)
     if args.json:
         print_json(found)
         return 0
