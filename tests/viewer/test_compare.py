@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from brachium_body import rotation
 from brachium_viewer import alignment, compare, compare_text
-from brachium_viewer.compare import CompareSettings, compare_tables
+from brachium_viewer.compare import CompareSettings, Comparison, matched
 from brachium_viewer.statistics import orientation_errors_deg
 from brachium_wire import table
 from brachium_wire.capture import load
@@ -32,6 +32,10 @@ def walk(seed: int) -> Any:
 
 def columns(stem: str, q: Any) -> dict[str, Any]:
     return {f"{stem}_q{part}": q[:, i] for i, part in enumerate("wxyz")}
+
+
+def compare_tables(a: Table, b: Table, chosen: CompareSettings) -> Comparison:
+    return matched(a, b, chosen)[0]
 
 
 @pytest.mark.parametrize("lag", [float("nan"), float("inf"), float("-inf")])

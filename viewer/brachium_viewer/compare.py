@@ -114,13 +114,6 @@ def compare(a: Path, b: Path, settings: CompareSettings | None = None) -> tuple[
     return matched(table.read(a), table.read(b), chosen, names=(str(a), str(b)))
 
 
-def compare_tables(
-    a: Table, b: Table, settings: CompareSettings, names: tuple[str, str] = ("a", "b")
-) -> Comparison:
-    """Compare two tables: every common column of numbers, and every common orientation."""
-    return matched(a, b, settings, names)[0]
-
-
 def matched(
     a: Table, b: Table, settings: CompareSettings, names: tuple[str, str] = ("a", "b")
 ) -> tuple[Comparison, Matched]:

@@ -78,7 +78,7 @@ def opened(stack: ExitStack, settings: ViewSettings, stop: threading.Event) -> t
     """
     if importlib.util.find_spec("rerun") is None:
         raise ViewError("the live view needs Rerun: pip install 'brachium[view]'")
-    web = settings.web if settings.web is not None else not _has_display()
+    web = settings.web if settings.web is not None else not has_display()
     grpc_port = free_port(settings.grpc_port, "the viewer's stream")
     files_port = free_port(0, "the viewer's files") if web else None
     viewer = stack.enter_context(
@@ -93,7 +93,8 @@ def opened(stack: ExitStack, settings: ViewSettings, stop: threading.Event) -> t
     return viewer, page.address
 
 
-def _has_display() -> bool:
+def has_display() -> bool:
+    """Return whether a window can be opened here."""
     return bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
 
 

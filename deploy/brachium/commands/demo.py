@@ -5,7 +5,6 @@ brachium demo --seconds 30 --exercise drinking
 
 import argparse
 import importlib.util
-import os
 import secrets
 import sys
 import time
@@ -165,15 +164,12 @@ def _wearer_words(args: argparse.Namespace) -> list[str]:
     ]
     for name, value in faults.items():
         words += [f"--{name}", str(value)]
+    from brachium_viewer.live import has_display
+
     seconds = args.seconds
     if seconds is None and (args.headless or not has_display()):
         seconds = ALONE_S
     return words if seconds is None else [*words, "--seconds", str(seconds)]
-
-
-def has_display() -> bool:
-    """Return whether a window can be opened here."""
-    return bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
 
 
 def _say(text: str) -> None:
