@@ -25,6 +25,7 @@ from brachium_nodes.node_frames import MAX_FRAME_BYTES, Hello
 from brachium_nodes.node_socket import House, NodeSocket
 from brachium_nodes.paced_loop import paced_loop
 from brachium_nodes.roster import SLIMEVR, Admission, NodeEntry, Refusal, Roster
+from brachium_nodes.shown_infos import ShownInfos
 from brachium_wire import keys
 from brachium_wire.bus import DEFAULT_ENDPOINT, Bus
 from brachium_wire.codec import encode
@@ -86,7 +87,7 @@ class Gateway:
         self._tokens: dict[str, Callable[[], None]] = {}
         self._open: set[Connection] = set()
         self._batteries = BatteryWatch()
-        self._told: dict[tuple[str, str], str] = {}  # whose info a place shows, connected or not
+        self._infos = ShownInfos(bus, settings.room, roster)
 
     async def serve(self, address: str, stop: threading.Event) -> None:
         """Listen until `stop` is set."""
@@ -175,7 +176,7 @@ class Gateway:
         self._tokens.pop(hello.node)()
         if admission.subject not in self._subjects():
             self._claims.release(admission.subject)
-        self._forget(hello.node)
+        self._infos.forget(hello.node)
         log.info("node %s left", hello.node)
 
     def _publish(self, admission: Admission, topic: str, message: Message) -> None:
@@ -188,8 +189,7 @@ class Gateway:
         elif topic == "info":
             assert isinstance(message, Info)
             self._known.told(message)
-            self._told[subject, segment] = admission.entry.id
-            self._bus.retain(keys.info(room, subject, segment), encode(message))
+            self._infos.show(subject, segment, message)
         else:
             assert isinstance(message, Status)
             self._batteries.look(message)
@@ -201,13 +201,6 @@ class Gateway:
             connection = self._connections.get(node)
             if connection is not None:
                 connection.do(connection.conversation.keep(calibration))
-
-    def _forget(self, node: str) -> None:
-        """Show no info any more at a place that a node was assigned away from."""
-        for place in [p for p, teller in self._told.items() if teller == node]:
-            if place != self._roster.place_of(node):
-                del self._told[place]
-                self._bus.forget(keys.info(self._settings.room, *place))
 
     def _expel(self, connection: Connection, refusal: Refusal) -> None:
         # In a turn of its own: who takes over is there before the old one leaves.
@@ -239,7 +232,7 @@ class Gateway:
         if connection is not None:
             self._expel(connection, Refusal("reassigned", f"assigned to {segment} of {subject}", 0.0))
         else:
-            self._forget(node)
+            self._infos.forget(node)
         self._beat(now=True)
         return ""
 

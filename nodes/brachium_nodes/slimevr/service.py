@@ -11,6 +11,7 @@ from brachium_nodes.discovery import broadcast_address
 from brachium_nodes.host_claim import HostClaims, checked_host
 from brachium_nodes.listening import BadAddress, CannotListen, listening_address, why_not
 from brachium_nodes.roster import SLIMEVR, Roster
+from brachium_nodes.shown_infos import ShownInfos
 from brachium_nodes.slimevr.actions import Action, Joined, Left, Publish, Send, Told
 from brachium_nodes.slimevr.allowed import Allowed, AllowList, from_node
 from brachium_nodes.slimevr.tracker import Address
@@ -20,7 +21,7 @@ from brachium_wire.bus import DEFAULT_ENDPOINT, Bus
 from brachium_wire.codec import encode
 from brachium_wire.heart import Heart
 from brachium_wire.hosttime import HostClock, tell_host_time
-from brachium_wire.messages import Quaternion
+from brachium_wire.messages import Info, Quaternion
 
 log = logging.getLogger(__name__)
 
@@ -65,7 +66,7 @@ class Service:
         self._roster = Roster((), NO_TOKEN)
         self._trackers = Trackers(allowed, self._roster, settings.id, self._claims.other)
         self._tokens: dict[str, Callable[[], None]] = {}
-        self._told: dict[tuple[str, str], str] = {}  # whose info a place shows
+        self._infos = ShownInfos(bus, settings.room, self._roster)
 
     async def serve(self, address: str, stop: threading.Event) -> None:
         """Listen until `stop` is set."""
@@ -132,7 +133,7 @@ class Service:
                     self._tokens.pop(node)()
                     if subject not in self._trackers.subjects:
                         self._claims.release(subject)
-                    self._forget(node)
+                    self._infos.forget(node)
                     log.info("tracker %s left: %s", node, reason)
                 case Told(text):
                     log.warning("%s", text)
@@ -146,8 +147,8 @@ class Service:
         )
         match action.topic:
             case "info":
-                self._told[subject, segment] = action.message.node  # type: ignore[attr-defined]
-                self._bus.retain(keys.info(room, subject, segment), payload)
+                assert isinstance(action.message, Info)
+                self._infos.show(subject, segment, action.message)
             case "imu":
                 self._heart.counts["batches"] += 1
                 self._bus.put(keys.imu(room, subject, segment), payload)
@@ -155,13 +156,6 @@ class Service:
                 self._bus.put(keys.status(room, subject, segment), payload)
             case "event":
                 self._bus.put(keys.event(room, subject), payload)
-
-    def _forget(self, node: str) -> None:
-        """Show no info any more at a place that a tracker was assigned away from."""
-        for place in [p for p, teller in self._told.items() if teller == node]:
-            if place != self._roster.place_of(node):
-                del self._told[place]
-                self._bus.forget(keys.info(self._settings.room, *place))
 
     def _give_way(self) -> None:
         for subject in self._trackers.subjects:
