@@ -54,9 +54,10 @@ class JointCentre:
 
 def find_joint_centre(motion: JointMotion) -> JointCentre | None:
     """Return heading and levers, or None where the movement does not show the heading."""
-    if motion.force_a is None or motion.force_b is None or len(motion.time_s) < 20:
+    a, b = (motion.force_a, motion.turning_a), (motion.force_b, motion.turning_b)
+    if a[0] is None or a[1] is None or b[0] is None or b[1] is None or len(motion.time_s) < 20:
         return None
-    rows = _Rows(motion, motion.force_a, motion.force_b)
+    rows = _Rows(motion.time_s, (a[0], a[1]), (b[0], b[1]))
     costs = np.array([rows.constant(heading) for heading in rows.scanned])
     spread = _spread(costs / len(motion.time_s))
     if spread > UNSEEN:
@@ -93,12 +94,11 @@ class _Rows:
 
     scanned = np.arange(-np.pi, np.pi, radians(10.0))
 
-    def __init__(self, motion: JointMotion, force_a: Floats, force_b: Floats) -> None:
+    def __init__(self, time_s: Floats, a: tuple[Floats, Floats], b: tuple[Floats, Floats]) -> None:
+        (force_a, self._turning_a), (force_b, self._turning_b) = a, b
         self._force_a, self._force_b = force_a, force_b
-        self._turning_a = _turning(motion.rate_a, motion.spin_a) @ motion.world_from_a
-        self._turning_b = _turning(motion.rate_b, motion.spin_b) @ motion.world_from_b
-        self.knots_s = knots(motion.time_s)
-        self._share = shares(motion.time_s, self.knots_s)
+        self.knots_s = knots(time_s)
+        self._share = shares(time_s, self.knots_s)
         moving = np.linalg.norm(force_a - _GRAVITY, axis=1) + np.linalg.norm(force_b - _GRAVITY, axis=1)
         self._weight = 1.0 / (FORCE_SD + FORCE_SHARE * moving)
 
@@ -156,9 +156,3 @@ _GRAVITY = np.array([0.0, 0.0, 9.81])
 def _loss(residual: Floats) -> Floats:
     square = np.einsum("ni,ni->n", residual, residual)
     return np.asarray(2.0 * LOSS_SCALE**2 * (np.sqrt(1.0 + square / LOSS_SCALE**2) - 1.0), dtype=np.float64)
-
-
-def _turning(rate: Floats, spin: Floats) -> Floats:
-    """Return [alpha x] + [w x][w x] (n, 3, 3) of rates and angular accelerations (n, 3)."""
-    across = rotation.cross_matrix(rate)
-    return rotation.cross_matrix(spin) + across @ across

@@ -14,7 +14,9 @@ Floats = npt.NDArray[np.float64]
 ROWS_HZ = 10.0
 """Instants kept: movement of arms is below 5 Hz, and skin's wobble above it."""
 SMOOTH_S = 0.1
-"""Rates and forces are averaged over about so long."""
+"""Rates are averaged over about so long."""
+SLOW_S = 0.4
+"""Forces are averaged over about so long: arms are moved at 1 or 2 Hz, and tremble at 4 to 12."""
 MOST_ROWS = 1500
 KNOT_S = 15.0
 """The heading between two sensors is taken as straight over so long."""
@@ -32,12 +34,13 @@ class JointMotion:
     rate_a: Floats
     """(n, 3) rad/s."""
     rate_b: Floats
-    spin_a: Floats
-    """(n, 3) rad/s^2: how the rate changes."""
-    spin_b: Floats
     force_a: Floats | None = None
     """(n, 3) specific force, m/s^2; None for sensors that deliver orientation only."""
     force_b: Floats | None = None
+    turning_a: Floats | None = None
+    """(n, 3, 3) rad/s^2: turns a lever in sensor axes into what it adds to the force; averaged as that is, so
+    that the force at the lever's end is averaged, too, and not another one."""
+    turning_b: Floats | None = None
 
     def part(self, first_s: float, end_s: float) -> "JointMotion":
         """Return the instants from first_s to end_s."""
@@ -48,10 +51,10 @@ class JointMotion:
             world_from_b=self.world_from_b[kept],
             rate_a=self.rate_a[kept],
             rate_b=self.rate_b[kept],
-            spin_a=self.spin_a[kept],
-            spin_b=self.spin_b[kept],
             force_a=None if self.force_a is None else self.force_a[kept],
             force_b=None if self.force_b is None else self.force_b[kept],
+            turning_a=None if self.turning_a is None else self.turning_a[kept],
+            turning_b=None if self.turning_b is None else self.turning_b[kept],
         )
 
 
@@ -82,7 +85,7 @@ def joint_motion(
         inside[max(0, first) : end] = True
     step = max(1, round(rate_hz / ROWS_HZ), int(np.ceil(inside.sum() / MOST_ROWS)))
     kept = [np.zeros(0, dtype=np.intp)]
-    columns = [np.zeros((0, 18))]
+    columns = [np.zeros((0, 30))]
     for first, end in runs(known & inside):
         if end - first < rate_hz:
             continue
@@ -95,11 +98,11 @@ def joint_motion(
         world_from_a=rotation.to_matrix(a.world_from_sensor[rows]),
         world_from_b=rotation.to_matrix(b.world_from_sensor[rows]),
         rate_a=moving[:, 0:3],
-        spin_a=moving[:, 3:6],
-        force_a=moving[:, 6:9] if forces else None,
-        rate_b=moving[:, 9:12],
-        spin_b=moving[:, 12:15],
-        force_b=moving[:, 15:18] if forces else None,
+        rate_b=moving[:, 15:18],
+        force_a=moving[:, 3:6] if forces else None,
+        force_b=moving[:, 18:21] if forces else None,
+        turning_a=moving[:, 6:15].reshape(-1, 3, 3) if forces else None,
+        turning_b=moving[:, 21:30].reshape(-1, 3, 3) if forces else None,
     )
 
 
@@ -115,23 +118,29 @@ def shares(time_s: Floats, knots_s: Floats) -> Floats:
 
 
 def _moving(sensor: SensorMotion, run: slice, rate_hz: float) -> Floats:
-    """Return rate, its change, and force (n, 9) in the sensor's world, smoothed without delay."""
+    """Return rate, force, and turning (n, 15) in the sensor's world, smoothed without delay."""
     quats = sensor.world_from_sensor[run]
     turn = rotation.multiply(quats[1:], rotation.inverse(quats[:-1]))
     between = rotation.to_rotation_vector(turn) * rate_hz
     rate = 0.5 * (np.concatenate([between[:1], between]) + np.concatenate([between, between[-1:]]))
-    force = np.zeros_like(rate) if sensor.acc is None else rotation.rotate(quats, sensor.acc[run])
-    rate, force = _smooth(rate, rate_hz), _smooth(force, rate_hz)
-    return np.concatenate([rate, np.gradient(rate, 1.0 / rate_hz, axis=0), force], axis=1).astype(np.float64)
+    rate = _smooth(rate, rate_hz, SMOOTH_S)
+    if sensor.acc is None:
+        return np.concatenate([rate, np.zeros((len(rate), 12))], axis=1).astype(np.float64)
+    across = rotation.cross_matrix(rate)
+    spin = rotation.cross_matrix(np.gradient(rate, 1.0 / rate_hz, axis=0))
+    turning = ((spin + across @ across) @ rotation.to_matrix(quats)).reshape(-1, 9)
+    force = rotation.rotate(quats, sensor.acc[run])
+    slow = _smooth(np.concatenate([force, turning], axis=1), rate_hz, SLOW_S)
+    return np.concatenate([rate, slow], axis=1).astype(np.float64)
 
 
-def _smooth(values: Floats, rate_hz: float) -> Floats:
-    """Return values (n, 3) under a Hann window."""
-    window = np.hanning(2 * max(1, round(0.5 * SMOOTH_S * rate_hz)) + 3)
+def _smooth(values: Floats, rate_hz: float, span_s: float) -> Floats:
+    """Return values (n, k) under a Hann window of about so long."""
+    window = np.hanning(2 * max(1, round(0.5 * span_s * rate_hz)) + 3)
     window /= window.sum()
     half = len(window) // 2
     padded = np.concatenate(
         [np.repeat(values[:1], half, axis=0), values, np.repeat(values[-1:], half, axis=0)]
     )
-    columns = [np.convolve(padded[:, i], window, mode="valid") for i in range(3)]
+    columns = [np.convolve(column, window, mode="valid") for column in padded.T]
     return np.stack(columns, axis=-1).astype(np.float64)

@@ -80,8 +80,6 @@ def test_a_heading_that_drifts_is_followed():
         world_from_b=turn @ motion.world_from_b,
         rate_a=motion.rate_a,
         rate_b=np.einsum("nij,nj->ni", turn, motion.rate_b),
-        spin_a=motion.spin_a,
-        spin_b=motion.spin_b,
     )
     best = fit_joint_axes(drifting, AxisPriors())[0]
     assert np.degrees(rotation.wrap(best.headings[-1] - best.headings[0])) == pytest.approx(3.0, abs=0.4)
@@ -93,7 +91,7 @@ def test_what_is_not_seen_is_not_claimed():
         time_s=motion.time_s,
         world_from_a=np.broadcast_to(motion.world_from_a[0], motion.world_from_a.shape),
         world_from_b=np.broadcast_to(motion.world_from_b[0], motion.world_from_b.shape),
-        **{name: np.zeros_like(motion.rate_a) for name in ("rate_a", "rate_b", "spin_a", "spin_b")},
+        **{name: np.zeros_like(motion.rate_a) for name in ("rate_a", "rate_b")},
     )
     best = fit_joint_axes(still, AxisPriors())[0]
     assert min(best.axis_a_sd, best.axis_b_sd, best.heading_sd) > np.radians(10.0)
