@@ -9,7 +9,7 @@ from brachium_viewer import marks
 from brachium_viewer.exercises import exercise
 from brachium_viewer.web import requests as r
 from brachium_viewer.web.page_state import PageState
-from brachium_viewer.web.session_desk import NoRecording, SessionDesk
+from brachium_viewer.web.session_desk import NoRecording, SessionDesk, Unreached
 from brachium_wire import keys
 from brachium_wire.bus import Bus
 from brachium_wire.codec import WireError, decode, encode
@@ -23,6 +23,7 @@ Json = dict[str, Any]
 LONGEST_S = 300.0
 """No calibration takes longer; fusion itself gives up earlier."""
 HEARD_S = 1.0
+STOPPED_UNWRITTEN = "stopped, but that is not written: the router or the recorder cannot be reached"
 
 
 class Refused(ValueError):
@@ -73,13 +74,12 @@ class Desk:
                 async with self._recording:
                     return await self._begin(subject, asked)
             case r.Stop():
-                return await self._end(subject, "stopped")
-            case r.PatientStop():
-                ended = await self._end(subject, "patient-stop", none_is_fine=True)
-                self._state.stopped = asked.reason  # every screen is told, whatever becomes of the recording
-                with suppress(NoRecording):  # it shows an alarm of its own
-                    await self._mark(subject, marks.PatientStop(reason=asked.reason))
+                ended = await self._end(subject, "stopped")
+                if not await self._sessions.reached(self._bus):
+                    raise Refused(STOPPED_UNWRITTEN)
                 return ended
+            case r.PatientStop():
+                return await self._patient_stop(subject, asked)
             case r.Report():
                 return await self._finish(subject, asked.language)
             case r.Mark():
@@ -161,6 +161,16 @@ class Desk:
         self._put(subject, marks.ExerciseEnds(reason="done" if done else reason), self._instant_ns())
         ended = self._state.end()
         return {"set": ended}
+
+    async def _patient_stop(self, subject: str, asked: r.PatientStop) -> Json:
+        ended = await self._end(subject, "patient-stop", none_is_fine=True)
+        self._state.stopped = asked.reason  # every screen is told, whatever becomes of the recording
+        try:
+            with suppress(NoRecording):  # it shows an alarm of its own
+                await self._mark(subject, marks.PatientStop(reason=asked.reason))
+        except Unreached:
+            raise Refused(STOPPED_UNWRITTEN) from None
+        return ended
 
     async def _finish(self, subject: str, language: str) -> Json:
         async with self._recording:

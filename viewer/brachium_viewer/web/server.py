@@ -198,7 +198,8 @@ class _Server:
                     seat.put_state(text)
 
     def _state_now(self, now_ns: int) -> str:
-        state, session = self._state.state(now_ns), self._sessions.state(self._state.subject)
+        session = self._sessions.state(self._state.subject, connected=self._bus.connected())
+        state = self._state.state(now_ns)
         alarms = {alarm["reason"]: alarm for alarm in state["alarms"] + session["alarms"]}
         return _text({**state, **session, "alarms": list(alarms.values())})
 

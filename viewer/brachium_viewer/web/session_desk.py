@@ -28,6 +28,13 @@ class NoRecording(ValueError):
     """There is no recording, or it did not begin: one line that says why."""
 
 
+class Unreached(ValueError):
+    """Router or recorder are gone, so nothing is kept: one line that says so."""
+
+    def __init__(self) -> None:
+        super().__init__("the router or the recorder cannot be reached: nothing is recorded until it is back")
+
+
 class SessionDesk:
     """One session at a time; its recorder runs in a thread of its own. Called on one event loop."""
 
@@ -36,6 +43,7 @@ class SessionDesk:
         self._settings = recorder.RecordSettings(
             endpoint=endpoint, room=room, folder=folder, id=f"{service_id}-session"
         )
+        self._token = keys.services(room, f"recorder/{self._settings.id}/alive")
         self._stop = threading.Event()
         self._thread: threading.Thread | None = None
         self._closed: recorder.RecordReport | None = None
@@ -48,7 +56,7 @@ class SessionDesk:
         """Why recording did not begin or stopped; until another one has begun."""
 
     async def begin(self, bus: Bus, subject: str, *, anew: bool = False) -> None:
-        """Record from now on, if not yet. Raises NoRecording.
+        """Record from now on, if not yet. Raises NoRecording, and Unreached while nothing can be kept.
 
         One call at a time. Where a recording stopped by itself, only `anew` begins the next one: whoever
         asks has seen the alarm.
@@ -59,8 +67,16 @@ class SessionDesk:
             await asyncio.to_thread(self.close)
             if self._closed is not None:
                 self._later(self._keep_aside(self._closed.path, subject))
+        if not await self.reached(bus):
+            raise Unreached
         if self._thread is None:
             await asyncio.to_thread(self._start, bus, subject)
+
+    async def reached(self, bus: Bus) -> bool:
+        """Return whether what is put now comes to the recording; before one, whether there is a router."""
+        if self._thread is None:
+            return bus.connected()
+        return bool(await asyncio.to_thread(bus.alive, self._token))
 
     async def end(self) -> recorder.RecordReport:
         """Close the recording. Raises NoRecording when there was none."""
@@ -79,13 +95,15 @@ class SessionDesk:
             self._history = None, []
         return {"recording": closed.path.name, "subject": subject, "ended": closed.ended, **kept}
 
-    def state(self, subject: str | None) -> Json:
+    def state(self, subject: str | None, *, connected: bool = True) -> Json:
         """Return what a page shows of the recording, of alarms and of what was before."""
         if subject is not None and subject != self._history[0]:
             self._history = subject, []
             self._later(self._look(subject))
         alarms = [{"what": "recording", "reason": self.failure}] if self.failure else []
-        return {"recording": self._recording(), "alarms": alarms, "history": self._history[1]}
+        if not connected:
+            alarms.append({"what": "router", "reason": ""})
+        return {"recording": self._recording(connected), "alarms": alarms, "history": self._history[1]}
 
     def report_file(self, name: str) -> Path | None:
         """Return the page of a session's report; None for one that is not there."""
@@ -102,11 +120,13 @@ class SessionDesk:
         if thread is not None:
             thread.join(CLOSE_S)
 
-    def _recording(self) -> Json:
+    def _recording(self, connected: bool) -> Json:
         if self.failure:
             return {"state": "failed", "seconds": None}
         if self._thread is None:
             return {"state": "off", "seconds": None}
+        if not connected:
+            return {"state": "cut", "seconds": None}
         return {"state": "on", "seconds": round(time.monotonic() - self._begun_s)}
 
     def _start(self, bus: Bus, subject: str) -> None:
@@ -114,9 +134,8 @@ class SessionDesk:
         self._stop, self._closed = threading.Event(), None
         thread = threading.Thread(target=self._run, args=(subject, self._stop), name="recorder")
         thread.start()
-        token = keys.services(self._settings.room, f"recorder/{self._settings.id}/alive")
         deadline = time.monotonic() + READY_S
-        while not bus.alive(token):  # until then, what is put is not recorded
+        while not bus.alive(self._token):  # until then, what is put is not recorded
             if not thread.is_alive() or time.monotonic() > deadline:
                 self._stop.set()
                 why = self.failure or f"the recorder did not start within {READY_S:.0f} s"
