@@ -95,18 +95,27 @@ def complete(
 
 
 def provenance(
-    known: npt.NDArray[np.intp], sternum: Mask | bool = False, shift: Mask | bool = False
+    known: npt.NDArray[np.intp],
+    sternum: Mask | bool = False,
+    shift: Mask | bool = False,
+    silent: Mask | bool = False,
 ) -> Provenance:
     """Return what rows with these sets (...) give.
 
     `sternum` (...) says where the thorax against its calibration pose is known; `shift` (...) where the
-    shoulder's shift is, which takes sensors on upper arm and forearm.
+    shoulder's shift is, which takes sensors on upper arm and forearm; `silent` (...) where a segment is not
+    known though it carries a sensor: a pose is stated for segments without one, and a gap stays a gap.
     """
     angles = np.take(_ANGLES, known, axis=0)
     both = (known & (UPPER_ARM | FOREARM)) == (UPPER_ARM | FOREARM)
     angles[..., _TRUNK] = np.where(np.asarray(sternum)[..., None], MEASURED, EMPTY)
     angles[..., _CLAVICLE] = np.where((both & np.asarray(shift))[..., None], MEASURED, EMPTY)
-    return Provenance(angles, np.take(_POSITIONS, known, axis=0))
+    positions = np.take(_POSITIONS, known, axis=0)
+    gap = np.asarray(silent)[..., None]
+    return Provenance(
+        np.where(gap & (angles == ASSUMED), EMPTY, angles).astype(np.uint8),
+        np.where(gap & (positions == ASSUMED), EMPTY, positions).astype(np.uint8),
+    )
 
 
 def withhold(values: npt.ArrayLike, codes: Codes) -> Array:

@@ -84,7 +84,8 @@ class Arms:
             chest_to_shoulder=numbers[:, 36],
         )
         shift_known = False if shift is None else ~np.isnan(shift[:, 0, 0])
-        codes = provenance(known, thorax_known, shift_known)
+        silent = np.array(["missing" in row.qualities[1:] for row in rows])
+        codes = provenance(known, thorax_known, shift_known, silent)
         angles = withhold(self._follow(rows, raw, joints.thorax_from_upper_arm, left), codes.angles)
         if self._printed:
             angles[:, :7] = withhold(printed_angles(joints, left), codes.angles[:, :7])

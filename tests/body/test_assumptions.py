@@ -169,6 +169,15 @@ def test_trunk_and_clavicle_come_with_their_own_sensors():
     assert (assumptions.provenance(known).angles[:, 20:] == EMPTY).all()
 
 
+def test_a_pose_stands_for_segments_without_a_sensor_and_never_for_a_silent_one():
+    known = np.arange(8)
+    codes, silent = assumptions.provenance(known), assumptions.provenance(known, silent=np.ones(8, bool))
+    for plain, gap in zip(codes, silent, strict=True):
+        assert (plain == ASSUMED).any()
+        assert np.array_equal(gap, np.where(plain == ASSUMED, EMPTY, plain))
+        assert gap.dtype == plain.dtype
+
+
 def test_what_is_empty_is_withheld():
     _, left, segments = arms(np.random.default_rng(38))
     partial = only(segments, "forearm")

@@ -175,8 +175,10 @@ def test_another_filter_solves_the_same_recording_to_other_numbers(messages, tmp
         assert reports[name].filter == name
         assert reports[name].live_compared == 0
         assert reports[name].rows == reports[None].rows
-    elbows = [[s.angles["elbow_flexion"] for s in r.skeletons[200:]] for r in reports.values()]
-    assert 0.001 < np.abs(np.subtract(elbows[0], elbows[1])).max() < 0.5
+    elbows = [[s.angles.get("elbow_flexion", np.nan) for s in r.skeletons[200:]] for r in reports.values()]
+    apart = np.abs(np.subtract(elbows[0], elbows[1]))
+    assert np.isfinite(apart).mean() > 0.5
+    assert 0.001 < np.nanmax(apart) < 0.5
     slower = solve(SolveSettings(input=tmp_path / "a.mcap", rate_hz=25.0))
     assert slower.rows == pytest.approx(reports[None].rows / 2, abs=1)
 

@@ -377,6 +377,20 @@ def test_a_segment_that_lags_is_held_then_missing_and_the_others_go_on(made, bat
     assert np.diff(times) == pytest.approx(TICK)
 
 
+@pytest.mark.parametrize("segment", ["upper_arm_r", "forearm_r", "hand_r"])
+def test_nothing_is_assumed_where_a_worn_sensor_is_silent(made, segment) -> None:
+    quats, _, _ = worn(made, seconds=6.0)
+    messages = made.info_messages(quats) + made.orientation_messages(quats)
+    pipeline = fed(silent_from(messages, segment, made, 4_000 * MS), changes=FACING)
+    found = published(pipeline)
+    gaps = [s for s in found if s.segments[segment].quality == "missing"]
+    assert len(gaps) >= 50
+    assert all("assumed" not in s.assumed.values() for s in found)
+    lost = "wrist_flexion" if segment == "hand_r" else "elbow_flexion"
+    assert all(lost in s.angles for s in found if s.segments[segment].quality == "good")
+    assert all(lost not in s.angles for s in gaps)
+
+
 def test_a_segment_that_comes_back_is_good_again(made) -> None:
     quats, _, _ = worn(made, seconds=8.0)
     messages = made.info_messages(quats) + made.orientation_messages(quats)
