@@ -100,8 +100,14 @@ function recording() {
   const time = `${Math.floor((seconds ?? 0) / 60)}:${String((seconds ?? 0) % 60).padStart(2, "0")}`;
   $("recording").textContent = say("recording", { time });
   const alarms = state.alarms.map(({ what, reason }) => say(`alarm.${what}`, { reason: told(reason) }));
-  if (state.stopped) alarms.unshift(say("alarm.stopped", { reason: say(`patient.reason.${state.stopped}`) }));
+  if (state.stopped) alarms.unshift(stopSaid(state.stopped));
   renew($("alarm"), alarms.join(), () => alarms.map((text) => make("p", {}, text)));
+}
+
+/** That the patient has stopped, and why once they have said it: until then it is "other". */
+function stopSaid(reason) {
+  if (reason === "other") return say("alarm.stopped.untold");
+  return say("alarm.stopped", { reason: say(`patient.reason.${reason}`) });
 }
 
 function history() {
