@@ -46,3 +46,9 @@ def worn(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="session")
 def emulated(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return write_session(tmp_path_factory.mktemp("emulated") / "emulated.mcap", "emulated")
+
+
+@pytest.fixture(scope="session")
+def impossible(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a session whose elbow bends farther than one can."""
+    return write_session(tmp_path_factory.mktemp("impossible") / "impossible.mcap", top_deg=175.0)

@@ -7,6 +7,7 @@ from brachium_viewer.metrics.smoothness import CUTOFF_HZ, LDLJ_RATE_HZ
 from brachium_viewer.report import report_tables as tables
 from brachium_viewer.report import words
 from brachium_viewer.report.build import Report
+from brachium_viewer.report.implausible import implausible
 from brachium_viewer.sessions.from_recording import readable, stops_between_sets
 
 
@@ -56,6 +57,7 @@ def warnings(report: Report) -> list[str]:
         if calibration.state == "refused":
             found.append(f"calibration refused: {calibration.reason}")
         found += [f"{what.replace('_', ' ')} not found: {why}" for what, why in calibration.refused.items()]
+    found += implausible(report.motions)
     if contents.unreadable:
         found.append(
             "left out: " + ", ".join(f"{n} messages {why}" for why, n in contents.unreadable.items())
