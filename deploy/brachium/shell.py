@@ -185,3 +185,8 @@ def _start_log(verbose: bool) -> None:
     )
     for noisy in ("websockets", "asyncio", "matplotlib", "PIL"):
         logging.getLogger(noisy).setLevel(logging.WARNING)
+
+
+def count(number: int, what: str) -> str:
+    """Return how many there are of something, as people say it."""
+    return f"{number} {what}{'' if number == 1 else 's'}"

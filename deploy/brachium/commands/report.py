@@ -8,7 +8,7 @@ import logging
 import os
 from pathlib import Path
 
-from brachium.shell import Usage, add_json, print_json
+from brachium.shell import Usage, add_json, count, print_json
 
 _log = logging.getLogger(__name__)
 
@@ -67,7 +67,8 @@ def run(args: argparse.Namespace) -> int:
         print_json(found)
         return 0
     said = "" if found.origin == "worn" else f" ({found.origin})"
-    print(f"{args.out}: {found.subject}{said}, {found.sets} sets, {found.repetitions} repetitions")
+    held = f"{count(found.sets, 'set')}, {count(found.repetitions, 'repetition')}"
+    print(f"{args.out}: {found.subject}{said}, {held}")
     if args.csv is not None:
         print(f"{args.csv}: one row a repetition")
     return 0

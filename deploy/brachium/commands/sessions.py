@@ -11,7 +11,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from brachium.shell import Usage, add_json, print_json
+from brachium.shell import Usage, add_json, count, print_json
 
 if TYPE_CHECKING:
     from brachium_viewer.sessions.records import SessionRecord
@@ -46,11 +46,13 @@ def configure(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Do it, and say what was done."""
+    from brachium_viewer.sessions.reading import open_to_read
     from brachium_viewer.sessions.store import Store
 
     if args.deed not in ("add", "import") and not args.dir.is_dir():
         raise Usage(f"--dir {args.dir}: there is no such folder")
-    with Store.open(args.dir) as store:
+    opened = open_to_read if args.deed in ("list", "show", "export") else Store.open
+    with opened(args.dir) as store:
         found, text = _DEEDS[args.deed](store, args)
     if args.json:
         print_json(found)
@@ -65,7 +67,11 @@ def _list(store: "Store", args: argparse.Namespace) -> tuple[Any, str]:  # noqa:
     lines = [_line(one) for one in sessions]
     rows = [{"id": s.id, "subject": s.subject, "origin": s.origin, "started_ns": s.started_ns,
              "recording": s.recording, "sets": len(s.sets)} for s in sessions]  # fmt: skip
-    text = "\n".join([f"{len(people)} subjects: {', '.join(people)}", *lines]) if people else "nobody yet"
+    text = (
+        "\n".join([f"{count(len(people), 'subject')}: {', '.join(people)}", *lines])
+        if people
+        else "nobody yet"
+    )
     return {"subjects": people, "sessions": rows}, text
 
 
@@ -76,7 +82,7 @@ def _show(store: "Store", args: argparse.Namespace) -> tuple[Any, str]:
         measures = one.measures
         best = measures.best_peak
         far = f"best {best.value:.0f} deg" if best.value is not None else f"withheld: {best.withheld}"
-        lines.append(f"  {' '.join(one.what)}: {len(measures.repetitions)} repetitions, {far}")
+        lines.append(f"  {' '.join(one.what)}: {count(len(measures.repetitions), 'repetition')}, {far}")
     return session, "\n".join(lines)
 
 
@@ -101,7 +107,8 @@ def _export(store: "Store", args: argparse.Namespace) -> tuple[Any, str]:
 
     packed = parcel.pack(store, args.what, args.out)
     sizes = {"sessions": len(packed.sessions), "recordings": len(packed.files)}
-    return sizes, f"{args.out}: {sizes['sessions']} sessions, {sizes['recordings']} recordings"
+    said = f"{count(sizes['sessions'], 'session')}, {count(sizes['recordings'], 'recording')}"
+    return sizes, f"{args.out}: {said}"
 
 
 def _import(store: "Store", args: argparse.Namespace) -> tuple[Any, str]:
@@ -109,7 +116,10 @@ def _import(store: "Store", args: argparse.Namespace) -> tuple[Any, str]:
 
     found = parcel.unpack(store, Path(args.what))
     who = found.subject.pseudonym
-    return {"subject": who, "sessions": len(found.sessions)}, f"{who}: {len(found.sessions)} sessions"
+    return {
+        "subject": who,
+        "sessions": len(found.sessions),
+    }, f"{who}: {count(len(found.sessions), 'session')}"
 
 
 def _delete(store: "Store", args: argparse.Namespace) -> tuple[Any, str]:
@@ -132,5 +142,5 @@ _DEEDS = {
 def _line(session: "SessionRecord") -> str:
     when = f"{datetime.fromtimestamp(session.started_ns / 1e9, UTC):%Y-%m-%d %H:%M} UTC"
     shown = "" if session.origin == "worn" else f"  {session.origin.upper()}, in no history"
-    sets = f"{len(session.sets)} sets" if len(session.sets) != 1 else "1 set"
+    sets = count(len(session.sets), "set")
     return f"{session.id}  {session.subject}  {when}  {sets}  {session.recording}{shown}"

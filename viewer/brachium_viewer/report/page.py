@@ -26,7 +26,7 @@ from brachium_viewer.report.build import (
 from brachium_viewer.report.groups import lags, symmetries
 from brachium_viewer.report.language import in_language, speaker
 from brachium_viewer.sessions import from_recording as sessions
-from brachium_viewer.sessions.store import Store
+from brachium_viewer.sessions.reading import open_to_read
 
 TEMPLATE = Path(__file__).with_name("report.html.j2")
 
@@ -74,7 +74,7 @@ def write(settings: ReportSettings) -> ReportFigures:
     who = sessions.the_subject(contents, name, settings.subject)
     motions = sessions.motions(contents, who)
     session = sessions.session(contents, name, who, motions, settings.without_marks)
-    opened: Any = nullcontext() if settings.sessions is None else closing(Store.open(settings.sessions))
+    opened: Any = nullcontext() if settings.sessions is None else closing(open_to_read(settings.sessions))
     with opened as store:
         known = store.subject(who) if store is not None else None
         report = build(

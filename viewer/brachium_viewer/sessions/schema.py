@@ -58,6 +58,10 @@ CREATE TABLE deleting (subject TEXT PRIMARY KEY) STRICT;
 whoever opens the store next."""
 
 
+class Unwritable(StoreError):
+    """The file is there or not, but nothing can be written where it lies."""
+
+
 def connect(folder: Path) -> sqlite3.Connection:
     """Open the folder's file, making its tables when it is new.
 
@@ -67,7 +71,7 @@ def connect(folder: Path) -> sqlite3.Connection:
     try:
         connection = sqlite3.connect(path, timeout=BUSY_S, isolation_level=None, check_same_thread=False)
     except sqlite3.OperationalError as error:
-        raise StoreError(_not_open(path, error)) from None
+        raise _not_open(path, error) from None
     try:
         connection.row_factory = sqlite3.Row
         connection.execute("PRAGMA journal_mode = WAL")
@@ -77,7 +81,7 @@ def connect(folder: Path) -> sqlite3.Connection:
         _settle(connection, path)
     except sqlite3.OperationalError as error:  # it may well be one: locked, not to be written, a broken disk
         connection.close()
-        raise StoreError(_not_open(path, error)) from None
+        raise _not_open(path, error) from None
     except sqlite3.DatabaseError as error:
         connection.close()
         raise StoreError(f"{path}: no store of sessions ({error}); choose another folder") from None
@@ -87,8 +91,41 @@ def connect(folder: Path) -> sqlite3.Connection:
     return connection
 
 
-def _not_open(path: Path, error: sqlite3.OperationalError) -> str:
-    return (
+def connect_to_read(folder: Path) -> sqlite3.Connection:
+    """Open the folder's file where nothing can be written, not even the log that readers share.
+
+    Raises StoreError where there is none, or where rows lie in a log that cannot be read so.
+    """
+    path = folder / FILE
+    log = path.with_name(path.name + "-wal")
+    ways = ["mode=ro"] if log.is_file() and log.stat().st_size else ["mode=ro", "mode=ro&immutable=1"]
+    said = ""
+    for way in ways:
+        try:
+            connection = sqlite3.connect(
+                f"{path.resolve().as_uri()}?{way}", uri=True, isolation_level=None, check_same_thread=False
+            )
+        except sqlite3.OperationalError as error:
+            said = str(error)
+            continue
+        connection.row_factory = sqlite3.Row
+        try:
+            _tables(connection, path)
+        except sqlite3.OperationalError as error:
+            connection.close()
+            said = str(error)
+            continue
+        except (sqlite3.DatabaseError, StoreError) as error:
+            connection.close()
+            raise StoreError(str(error)) from None
+        return connection
+    raise StoreError(f"{path}: cannot be read ({said}); copy the whole folder to where you may write")
+
+
+def _not_open(path: Path, error: sqlite3.OperationalError) -> StoreError:
+    kind = getattr(error, "sqlite_errorcode", 0) & 0xFF  # not every one is of the library
+    unwritable = kind in (sqlite3.SQLITE_READONLY, sqlite3.SQLITE_CANTOPEN)
+    return (Unwritable if unwritable else StoreError)(
         f"{path}: cannot be opened for writing ({error}); give it back its rights, or choose another folder"
     )
 
@@ -96,17 +133,7 @@ def _not_open(path: Path, error: sqlite3.OperationalError) -> str:
 def _settle(connection: sqlite3.Connection, path: Path) -> None:
     connection.execute("BEGIN IMMEDIATE")  # two processes may come to a new folder at once
     try:
-        version = int(connection.execute("PRAGMA user_version").fetchone()[0])
-        owner = int(connection.execute("PRAGMA application_id").fetchone()[0])
-        tables = int(connection.execute("SELECT count(*) FROM sqlite_master").fetchone()[0])
-        if tables and owner != APPLICATION:
-            raise StoreError(f"{path}: a SQLite file of another program; choose another folder")
-        if version > VERSION:
-            raise StoreError(
-                f"{path}: written by a newer Brachium (tables of version {version}; "
-                f"this one knows {VERSION}); update Brachium"
-            )
-        if not tables:
+        if not _tables(connection, path):
             for statement in TABLES.split(";"):
                 connection.execute(statement)
             connection.execute(f"PRAGMA application_id = {APPLICATION}")
@@ -115,3 +142,18 @@ def _settle(connection: sqlite3.Connection, path: Path) -> None:
         connection.execute("ROLLBACK")
         raise
     connection.execute("COMMIT")
+
+
+def _tables(connection: sqlite3.Connection, path: Path) -> int:
+    """Return how many tables there are; raises StoreError when they are none of ours, or newer ones."""
+    version = int(connection.execute("PRAGMA user_version").fetchone()[0])
+    owner = int(connection.execute("PRAGMA application_id").fetchone()[0])
+    tables = int(connection.execute("SELECT count(*) FROM sqlite_master").fetchone()[0])
+    if tables and owner != APPLICATION:
+        raise StoreError(f"{path}: a SQLite file of another program; choose another folder")
+    if version > VERSION:
+        raise StoreError(
+            f"{path}: written by a newer Brachium (tables of version {version}; "
+            f"this one knows {VERSION}); update Brachium"
+        )
+    return tables
