@@ -110,3 +110,15 @@ def test_the_patient_is_told_no_degrees_and_given_no_praise():
             if key.startswith("patient."):
                 assert "°" not in text, key
                 assert not any(word in text.lower() for word in PRAISE), key
+
+
+def test_one_repetition_has_words_of_its_own():
+    counted = set()
+    for path in SCRIPTS:
+        counted |= set(re.findall(r"""\bsayCount\("([^"]+)\"""", path.read_text("utf-8")))
+    assert counted == {"counted", "set.done"}
+    for language in LANGUAGES:
+        known = words(language)
+        for key in counted:
+            assert known[f"{key}.one"] == known[key].replace("repetitions", "repetition").replace("ungen", "ung")
+            assert known[f"{key}.one"] != known[key]

@@ -12,7 +12,7 @@ import { showHeadline, showParts, showSensors } from "./sensors.js";
 import { Tabs } from "./tabs.js";
 import { switchTheme } from "./theme.js";
 import { sounds, switchSound } from "./tone.js";
-import { language, say, speak, told } from "./words.js";
+import { language, say, sayCount, speak, told } from "./words.js";
 
 let state = null;
 let set = 1;
@@ -138,7 +138,7 @@ $("stop").addEventListener("click", async () => {
   const answer = await busy($("stop"), () => link.ask("stop"));
   if (answer.ok) numbers.ended = { ...answer.data.set, number: set };
   const last = set >= plan.words.sets;
-  tell($("action-said"), answer, say("set.done", { count: answer.data?.set?.count ?? 0 }));
+  tell($("action-said"), answer, sayCount("set.done", answer.data?.set?.count ?? 0));
   if (answer.ok) set = last ? 1 : set + 1;
   if (answer.ok) lead($("start"));
   if (answer.ok && last) tabs.show($("tab-finish"));

@@ -5,7 +5,7 @@ import { Gauge } from "./gauge.js";
 import { $, make, put, renew } from "./page.js";
 import { MEASURED } from "./quality.js";
 import { counted, warn } from "./tone.js";
-import { number, say } from "./words.js";
+import { number, say, sayCount } from "./words.js";
 
 const WARN_MS = 900;
 
@@ -71,7 +71,7 @@ export class Numbers {
     put($("count-tries"), shown ? number(shown.tries) : "–");
     if (set && this.count !== null && set.count > this.count) {
       counted();
-      $("count-said").textContent = say("counted", { count: set.count });
+      $("count-said").textContent = sayCount("counted", set.count);
     }
     this.count = set ? set.count : null;
     this.beyond(Boolean(set?.over));

@@ -37,6 +37,11 @@ export function say(key, values = {}) {
   return text.replace(/\{(\w+)\}/g, (whole, name) => values[name] ?? whole);
 }
 
+/** The words of a key for so many repetitions: one has words of its own. */
+export function sayCount(key, count) {
+  return say(count === 1 ? `${key}.one` : key, { count: number(count) });
+}
+
 /** A sentence that a service said in English, in this language; one that no catalogue knows stays as it came. */
 export function told(text) {
   if (!text) return "";
