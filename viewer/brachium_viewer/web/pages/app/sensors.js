@@ -68,20 +68,30 @@ export function showSensors(state) {
   $("waiting").textContent = say("waiting", { nodes: state.waiting.join(", ") });
 }
 
-/** The qualities of the arm's parts, where one is not plainly measured. */
+/** The arm's parts: a colour for each that is plainly measured, and what is wrong with all the others. */
 export function showParts(arms) {
   const rows = Object.entries(arms).flatMap(([side, arm]) =>
     Object.entries(arm.parts).map(([part, quality]) => [side, part, arm.stale ? "missing" : quality]),
   );
   const both = Object.keys(arms).length > 1;
-  renew($("parts"), JSON.stringify(rows) + say("quality.held"), () =>
-    rows
-      .filter(([side, , quality]) => !both || side === "right" || quality !== "good")
-      .map(([side, part, quality]) => {
-        const measured = quality === "good";
-        const name = say(`part.${part}`) + (both && !measured ? ` ${say(`side.${side}.short`)}` : "");
-        const words = measured || !has(`quality.${quality}`) ? name : `${name}: ${say(`quality.${quality}`)}`;
-        return make("li", {}, make("span", { class: `swatch ${measured ? part : "not"}` }), words);
+  renew($("parts"), JSON.stringify(rows) + say("quality.held"), () => {
+    const doubtful = new Map();
+    for (const [side, part, quality] of rows) {
+      if (quality === "good") continue;
+      const name = say(`part.${part}`) + (both ? ` ${say(`side.${side}.short`)}` : "");
+      doubtful.set(quality, [...(doubtful.get(quality) ?? []), name]);
+    }
+    const good = rows.filter(([side, , quality]) => quality === "good" && (!both || side === "right"));
+    return [
+      ...good.map(([, part]) => entry(part, say(`part.${part}`))),
+      ...[...doubtful].map(([quality, names]) => {
+        const known = has(`quality.${quality}`) ? `: ${say(`quality.${quality}`)}` : "";
+        return entry("not", names.join(", ") + known);
       }),
-  );
+    ];
+  });
+}
+
+function entry(swatch, words) {
+  return make("li", {}, make("span", { class: `swatch ${swatch}` }), words);
 }
