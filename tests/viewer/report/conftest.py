@@ -52,3 +52,8 @@ def emulated(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def impossible(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return a session whose elbow bends farther than one can."""
     return write_session(tmp_path_factory.mktemp("impossible") / "impossible.mcap", top_deg=175.0)
+
+
+@pytest.fixture(name="scripts", scope="session")
+def _scripts() -> Any:
+    return scripts

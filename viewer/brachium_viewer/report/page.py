@@ -161,7 +161,8 @@ def movement_charts(report: Report) -> list[Chart]:
         lines = movement_lines(found, motion, report.zero_ns)
         label = ", ".join(f"{n} {mode}" for mode, n in counts.items())
         svg = report_charts.movement(f"{side}-{name}", lines)
-        drawn.append(Chart(words.movement(name, side).capitalize(), f"{label} repetitions", svg))
+        told = f"{label} repetition" if sum(counts.values()) == 1 else f"{label} repetitions"
+        drawn.append(Chart(words.movement(name, side).capitalize(), told, svg))
     return drawn
 
 

@@ -39,12 +39,14 @@ def how_zero_was_set(report: Report) -> str:
         for (who, _), arm in report.contents.arms.items()
         if who == subject and len(arm.published)
     }
-    facing = "; ".join(words.FORWARD[one] for one in sorted(forward))
+    facing = "; ".join(words.FORWARD[one] for one in sorted(forward)) or words.FORWARD["none"]
     if found is None or not (found.pose or found.mounting or found.state == "done"):
-        return f"The recording holds no calibration. Forward: {facing or words.FORWARD['none']}."
+        return f"The recording holds no calibration. Forward: {facing}."
     pose = f"in pose {found.pose}" if found.pose else "from stated mountings"
-    scores = ", ".join(f"{name.replace('_', ' ')} {value:.3g}" for name, value in found.scores.items())
-    return f"Zero {pose}. Forward {facing}." + (f" Scores of the calibration: {scores}." if scores else "")
+    scores = ", ".join(words.score(name, value) for name, value in found.scores.items())
+    if not scores:
+        return f"Zero {pose}. Forward {facing}."
+    return f"Zero {pose}. Forward {facing}. Scores of the calibration: {scores}."
 
 
 def warnings(report: Report) -> list[str]:

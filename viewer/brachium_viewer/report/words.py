@@ -67,3 +67,13 @@ def exercise(name: str) -> str:
 def movement(name: str, side: str, mode: str = "") -> str:
     """Return what was done by which arm, and how where it is said."""
     return f"{exercise(name)}, {side}" + (f", {mode}" if mode else "")
+
+
+def score(name: str, value: float) -> str:
+    """Return a calibration's score with its unit; one without words keeps its name."""
+    segment = name.rpartition("_deg_")[2].replace("_", " ")
+    if name.startswith("sway_deg_"):
+        return f"sway of {segment}: {value:.2f} deg"
+    if name.startswith("from_nominal_deg_"):
+        return f"way off the stated mounting of {segment}: {value:.1f} deg"
+    return f"{name.replace('_', ' ')} {value:.3g}"

@@ -1,0 +1,48 @@
+"""What a report says of a calibration and of names, in words with units, in both languages."""
+
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+from brachium_viewer.catalogue import catalogue
+from brachium_viewer.report import page, sentences, words
+from brachium_wire.messages import Calibration
+
+
+def report_of(calibration: Calibration) -> Any:
+    contents = SimpleNamespace(calibrations={"p01": calibration}, arms={})
+    return SimpleNamespace(session=SimpleNamespace(subject="p01"), contents=contents)
+
+
+def test_scores_are_words_with_units() -> None:
+    scores = {"sway_deg_upper_arm_r": 0.0124, "from_nominal_deg_forearm_r": 9.79}
+    said = sentences.how_zero_was_set(
+        report_of(Calibration(time_ns=1, state="done", pose="n-pose", scores=scores))
+    )
+    assert said == (
+        "Zero in pose n-pose. Forward not known: headings are assumed. Scores of the calibration: "
+        "sway of upper arm r: 0.01 deg, way off the stated mounting of forearm r: 9.8 deg."
+    )
+    told = catalogue("de").told(said)
+    assert "Oberarm rechts schwankte um 0,01°, Unterarm rechts 9,8° neben dem vorgesehenen Sitz" in told
+    assert "Vorn nicht bekannt" in told
+
+
+def test_a_score_without_words_keeps_its_name() -> None:
+    assert words.score("elbow_share", 0.51234) == "elbow share 0.512"
+
+
+def test_one_repetition_is_said_as_one(scripts: Any, tmp_path: Path) -> None:
+    one = scripts.Script("p01")
+    one.set(1, 90.0)
+    recording = scripts.write(tmp_path / "a.mcap", [one])
+    settings = page.ReportSettings(recording=recording, out=tmp_path / "a.html")
+    page.write(settings)
+    assert "1 active repetition<" in settings.out.read_text("utf-8")
+    page.write(replace(settings, language="de"))
+    assert "1 aktiv (Wiederholung)" in settings.out.read_text("utf-8")
+
+
+def test_a_long_pseudonym_breaks() -> None:
+    assert "h1 { font-size: 17pt; overflow-wrap: anywhere; }" in page.TEMPLATE.read_text("utf-8")
