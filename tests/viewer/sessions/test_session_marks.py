@@ -5,16 +5,18 @@ from pathlib import Path
 from typing import Any
 
 import msgspec
+import pytest
 
 from brachium_viewer import marks as m
-from brachium_viewer.contents import load
+from brachium_viewer.contents import Contents, load
 from brachium_viewer.sessions.from_recording import (
     readable,
     session_from_recording,
     spans,
     stops_between_sets,
+    the_subject,
 )
-from brachium_viewer.sessions.records import SetRecord
+from brachium_viewer.sessions.records import SetRecord, StoreError
 
 RIGHT, LEFT = (m.ExerciseBegins(exercise="elbow-flexion", side=side) for side in ("right", "left"))
 
@@ -66,3 +68,11 @@ def test_a_stop_while_no_set_runs_is_told_by_itself(
     assert msgspec.json.decode(msgspec.json.encode(session.sets[0]), type=SetRecord) == session.sets[0]
     marks = readable(load(path).events["p01"])
     assert stops_between_sets(marks, session.sets) == ["tired", "pain"]
+
+
+def test_a_rating_alone_is_no_session_and_says_so() -> None:
+    contents = Contents(events={"p09": [m.event(m.Pain(value=4, when="before"), 1)]})
+    with pytest.raises(StoreError, match="holds what was said of p09, and no sensor"):
+        the_subject(contents, "a.mcap", "p09")
+    with pytest.raises(StoreError, match="holds no 'p08'"):
+        the_subject(contents, "a.mcap", "p08")

@@ -59,6 +59,11 @@ def session_from_recording(
 def the_subject(contents: Contents, name: str, wanted: str | None = None) -> str:
     """Return the subject asked for, or the only one."""
     found = sorted({who for who, _ in (*contents.arms, *contents.sensors)})
+    if wanted is not None and wanted not in found and wanted in contents.events:
+        raise StoreError(
+            f"{name}: holds what was said of {wanted}, and no sensor or arm of theirs: nothing was measured, "
+            "so there is no report and it is in no history; the file stays where it is"
+        )
     if wanted is not None and wanted not in found:
         raise StoreError(f"{name}: holds no {wanted!r}; there {_are(found)}")
     if wanted is None and len(found) != 1:
