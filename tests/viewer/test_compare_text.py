@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from brachium_viewer.compare import CompareSettings, compare_tables
+from brachium_viewer.compare import CompareSettings, Comparison, matched
 from brachium_viewer.compare_text import text
 from brachium_wire.table import Table, TableError
 
@@ -17,6 +17,10 @@ def side(offset_deg: float, shift_m: float, late_s: float = 0.0) -> Table:
     columns = {"time": TIME + late_s, "elbow_flexion": FLEXION + offset_deg}
     columns |= {f"wrist_{axis}": POINT[:, k] + shift_m for k, axis in enumerate("xyz")}
     return Table(columns, UNITS)
+
+
+def compare_tables(a: Table, b: Table, chosen: CompareSettings) -> Comparison:
+    return matched(a, b, chosen)[0]
 
 
 def test_aligning_says_what_it_took_out() -> None:

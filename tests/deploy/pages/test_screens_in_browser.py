@@ -34,9 +34,9 @@ def test_with_a_keyboard_alone_through_a_guided_calibration_to_a_counted_set(scr
             assert page.evaluate("getComputedStyle(document.activeElement).boxShadow") != "none"
 
         one.open("/")
+        go("calibrate-guided")  # before the wearer comes, who stands still for 4 s only
         with network.wearer(routine="calibration"):
             one.until(lambda: page.inner_text("#headline").startswith("3 "))
-            go("calibrate-guided")
             page.keyboard.press("Enter")
             one.until(lambda: page.is_visible("#prompt"))
             one.until(lambda: "palm up" in page.inner_text("#prompt-words").lower())
