@@ -96,6 +96,7 @@ def over_a_network(steps: list[str] | None = None) -> NetworkFigures:
             samples = bus.subscribe(keys.imu(ROOM, SUBJECT, SEGMENT))
             network.start()
             network.until(lambda: samples.received > 0, "samples")
+            network.until(lambda: bool(bus.alive(keys.services(ROOM, "fusion/*/alive"))), "fusion")
             begun = time.monotonic()
             said = network.calibrate(steps)
             seconds = time.monotonic() - begun

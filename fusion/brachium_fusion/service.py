@@ -70,7 +70,6 @@ class FusionService:
     def __init__(self, bus: Bus, settings: FuseSettings) -> None:
         self._bus, self._room = bus, settings.room
         self._pipeline = Pipeline(settings.pipeline)
-        self._heart = Heart(bus, settings.room, "fusion", settings.service_id)
         self._door: Counter[str] = Counter()
         """What was refused before it reached a subject."""
         self._inbox: Inbox = bus.subscribe(keys.subjects(settings.room, "imu/**"))
@@ -96,6 +95,8 @@ class FusionService:
             )
         for key, payload in bus.fetch(keys.subjects(settings.room, "session")):
             self._heard_session(key, payload)
+        # Last: who sees it alive may ask it at once.
+        self._heart = Heart(bus, settings.room, "fusion", settings.service_id)
 
     def pause_s(self) -> float:
         """Return how long to wait before the next turn."""

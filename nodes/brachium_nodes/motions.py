@@ -12,7 +12,9 @@ import numpy as np
 import numpy.typing as npt
 
 from brachium_body.lengths import ArmLengths
+from brachium_body.segments import Side
 from brachium_nodes.movement import Array, Variation, eased, minimum_jerk
+from brachium_nodes.sensors import generator
 
 ANGLES = (
     "shoulder_flexion",
@@ -43,6 +45,18 @@ class Build:
     """The elbow does not straighten further; 0: it does."""
     pose_error_deg: Mapping[str, float] = field(default_factory=dict[str, float])
     """By how much each angle is off when this arm means to hold a pose."""
+
+
+def pose_error(size_deg: float, seed: int, side: Side) -> dict[str, float]:
+    """Return by how much one arm's angles are off in every pose that is meant, deg.
+
+    The upper arm is off by `size_deg` (3-D rms), and so is the forearm on it. No arm hangs into the trunk and
+    no elbow is stretched beyond straight, so abduction and elbow flexion are off to one side.
+    """
+    random = generator(seed, side, "pose")
+    off = size_deg * random.standard_normal(5) / np.sqrt([3.0, 3.0, 3.0, 2.0, 2.0])
+    named = dict(zip(ANGLES[:5], off.tolist(), strict=True))
+    return {**named, **{name: abs(named[name]) for name in ("shoulder_abduction", "elbow_flexion")}}
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -10,7 +10,7 @@ from brachium_body.segments import Segment
 from brachium_nodes import tissue
 from brachium_nodes.magnetism import Surroundings
 from brachium_nodes.movement import Array, Variation, minimum_jerk
-from brachium_nodes.person import NEUTRAL_S, TRANSITION_S, Person
+from brachium_nodes.person import TRANSITION_S, Person
 from brachium_nodes.places import Place, place
 from brachium_nodes.sensors import FIELD_UT, GRAVITY, Errors, generator
 from brachium_nodes.wearing import TURNS, Wearing
@@ -40,6 +40,8 @@ class Worn:
     """segment_from_sensor as the strap was put on; of the seat."""
     settling: Array
     """Rotation vector (3,) rad, in sensor axes, by which it settles as movement begins."""
+    stand_s: float
+    """When movement begins."""
     tissue: Array
     """One rotation vector (3,) rad in segment axes for each neighbouring joint."""
     lag: float
@@ -80,6 +82,7 @@ class Worn:
             place=where,
             placement=np.array(wearing.mounting[segment]) if segment in wearing.mounting else placement,
             settling=random_turn(errors.settling_deg, random),
+            stand_s=person.settings.stand_s,
             tissue=unit * (errors.soft_tissue_deg * pi / 180.0),
             lag=-outward * lag,
             slip=errors.slip_deg * pi / 180.0 * slipping / np.linalg.norm(slipping),
@@ -127,7 +130,7 @@ class Worn:
             point = point + rotation.rotate(bone, shift)
         q = rotation.multiply(skin, self.placement)
         if self.settling.any():
-            begun = minimum_jerk((t - NEUTRAL_S) / TRANSITION_S)
+            begun = minimum_jerk((t - self.stand_s) / TRANSITION_S)
             q = rotation.multiply(q, rotation.from_rotation_vector(begun[:, None] * self.settling))
         if self.slip_s < inf and self.slip.any():
             gone = minimum_jerk((t - self.slip_s) / SLIP_S)

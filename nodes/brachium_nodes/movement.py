@@ -35,6 +35,12 @@ def eased(t: npt.ArrayLike, rise_s: float) -> Array:
     return rise_s * u**4 * (2.5 - 3.0 * u + u * u) + np.maximum(t - rise_s, 0.0)
 
 
+def at_least(value: Array, limit: float, *, within: float) -> Array:
+    """Return the value (n,), or the limit where it is less; near it, `within` about, the way is smooth."""
+    result: Array = 0.5 * (value + limit + np.sqrt((value - limit) ** 2 + within**2))
+    return result
+
+
 @dataclass(frozen=True, slots=True)
 class Variation:
     """The natural variation of one arm of one person: everything random about its movement."""

@@ -1,6 +1,6 @@
 """The body of an emulated wearer: where each segment really is at any instant.
 
-World axes are east, north, up; the person faces magnetic north, stands in neutral for NEUTRAL_S, goes to the
+World axes are east, north, up; the person faces magnetic north, stands in neutral for `stand_s`, goes to the
 exercise's first posture within TRANSITION_S by a minimum-jerk movement and exercises for ever after.
 """
 
@@ -15,19 +15,22 @@ from brachium_body.kinematics import TRUNK_FROM_THORAX
 from brachium_body.lengths import ArmLengths, from_height
 from brachium_body.segments import ARM_PARTS, Side
 from brachium_nodes.exercises import EXERCISES
-from brachium_nodes.motions import ANGLES, DEG, Build, Posture
-from brachium_nodes.movement import Array, Variation, eased, minimum_jerk
+from brachium_nodes.motions import DEG, Build, Posture, pose_error
+from brachium_nodes.movement import Array, Variation, at_least, eased, minimum_jerk
 from brachium_nodes.routines import ROUTINES
 from brachium_nodes.script import Routine, Span
-from brachium_nodes.sensors import generator
 
 Arms = Literal["right", "left", "both"]
 
 NEUTRAL_S = 4.0
+"""Of standing first: a pose is calibrated from 3 s."""
 TRANSITION_S = 2.0
 
 CHEST_ABOVE_PELVIS = 0.25
 """Of body height: the arm of the trunk's sway."""
+
+LONGEST_STAND_S = 3600.0
+"""An hour: more than any calibration takes, and a unit mixed up shows."""
 
 TREMOR_HZ = (4.5, 5.5)
 TREMBLING = ("shoulder_flexion", "elbow_flexion", "forearm_pronation")
@@ -48,6 +51,8 @@ class PersonSettings:
     """Elbow flexion at which the elbows stop when straightened; 0: they straighten."""
     routine: str = ""
     """What is done before the exercise: a routine of routines.ROUTINES, or nothing."""
+    stand_s: float = NEUTRAL_S
+    """Standing in neutral comes before all else; somebody who calibrates by hand needs longer."""
     extent: float = 1.0
     """How far the exercise goes from neutral: 1 as it is described, 0 stands still."""
     movement_seed: int | None = None
@@ -72,6 +77,10 @@ class PersonSettings:
         if self.routine and self.routine not in ROUTINES:
             raise ValueError(
                 f"routine {self.routine!r} is not known; choose one of {', '.join(filter(None, ROUTINES))}"
+            )
+        if not NEUTRAL_S <= self.stand_s <= LONGEST_STAND_S:
+            raise ValueError(
+                f"{self.stand_s:g} s of standing cannot be used; give {NEUTRAL_S:g} to {LONGEST_STAND_S:g} s"
             )
         if not 0.0 <= self.extent <= 1.2:
             raise ValueError(f"extent {self.extent} cannot be used; give 0 to 1.2")
@@ -136,9 +145,9 @@ class Person:
         made, before = moving.scaled(s.extent * share), share < 1.0
         first = self.routine if active else ROUTINES[""](build)
         if before.any() and (self.pose_error_deg or s.routine):
-            early = first(t[before] - NEUTRAL_S, Variation(s.seed, side), build)
+            early = first(t[before] - s.stand_s, Variation(s.seed, side), build)
             made = made.added(early.scaled(1.0 - share[before]), before)
-        held = first.held(t - NEUTRAL_S) * (1.0 - share) if self.tremor_deg else share
+        held = first.held(t - s.stand_s) * (1.0 - share) if self.tremor_deg else share
         return self._impaired(made, t, side, 1.0 - held)
 
     def build(self, side: Side) -> Build:
@@ -159,13 +168,13 @@ class Person:
     @property
     def begins_s(self) -> float:
         """When the way from neutral to the exercise's first posture begins."""
-        return NEUTRAL_S + self.routine.seconds
+        return self.settings.stand_s + self.routine.seconds
 
     @property
     def spans(self) -> tuple[Span, ...]:
         """What is done when before the exercise, in true time; standing in neutral comes first."""
-        standing = Span("n-pose", 0.0, NEUTRAL_S)
-        return (standing, *(span.later(NEUTRAL_S) for span in self.routine.spans))
+        stand_s = self.settings.stand_s
+        return (Span("n-pose", 0.0, stand_s), *(span.later(stand_s) for span in self.routine.spans))
 
     def _impaired(self, made: Posture, t: Array, side: Side, active: Array) -> Posture:
         """Return the posture with tremor, as far as the arm is `active` (n,), and with an elbow that does not
@@ -174,7 +183,8 @@ class Person:
             variation, size = Variation(self.settings.seed, side), self.tremor_deg * DEG * active
             made = made.turned({n: size * variation.wander(f"tremor/{n}", t, *TREMOR_HZ) for n in TREMBLING})
         if self.settings.contracture_deg:
-            elbow = at_least(made.angles["elbow_flexion"], self.settings.contracture_deg * DEG)
+            limit = self.settings.contracture_deg * DEG
+            elbow = at_least(made.angles["elbow_flexion"], limit, within=6.0 * DEG)
             made = Posture({**made.angles, "elbow_flexion": elbow}, made.shift)
         return made
 
@@ -215,24 +225,6 @@ class Person:
 
     def _begun(self, t: Array) -> Array:
         return minimum_jerk((t - self.begins_s) / TRANSITION_S)
-
-
-def pose_error(size_deg: float, seed: int, side: Side) -> dict[str, float]:
-    """Return by how much one arm's angles are off in every pose that is meant, deg.
-
-    The upper arm is off by `size_deg` (3-D rms), and so is the forearm on it. No arm hangs into the trunk and
-    no elbow is stretched beyond straight, so abduction and elbow flexion are off to one side.
-    """
-    random = generator(seed, side, "pose")
-    off = size_deg * random.standard_normal(5) / np.sqrt([3.0, 3.0, 3.0, 2.0, 2.0])
-    named = dict(zip(ANGLES[:5], off.tolist(), strict=True))
-    return {**named, **{name: abs(named[name]) for name in ("shoulder_abduction", "elbow_flexion")}}
-
-
-def at_least(angle: Array, limit: float) -> Array:
-    """Return the angle, or the limit where it is less; within some 6 deg of it the way is a smooth curve."""
-    result: Array = 0.5 * (angle + limit + np.sqrt((angle - limit) ** 2 + (6.0 * DEG) ** 2))
-    return result
 
 
 def joint_turns(angles: dict[str, Array], carrying: float) -> tuple[Array, Array, Array]:

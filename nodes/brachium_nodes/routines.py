@@ -106,14 +106,6 @@ def wear_check(build: Build) -> Routine:
     return script.end(_RAISING, rest_s=0.5)
 
 
-def standing(build: Build) -> Routine:
-    """10 s more of standing: time for somebody to calibrate by hand."""
-    del build
-    script = Script()
-    script.wait(6.0)
-    return script.end({})
-
-
 def nothing(build: Build) -> Routine:
     """Stand in neutral."""
     del build
@@ -130,6 +122,5 @@ ROUTINES: dict[str, Callable[[Build], Routine]] = {
     "calibration-mixed-up": mixed_up_calibration,
     "calibration-restless": restless_calibration,
     "wear-check": wear_check,
-    "standing": standing,
 }
 """By name; each takes the arm that does it. After `""` the exercise follows at once."""

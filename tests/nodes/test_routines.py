@@ -4,7 +4,10 @@ import numpy as np
 import pytest
 
 from brachium_body.angles import INDEX
-from brachium_nodes.person import NEUTRAL_S, Person, PersonSettings, pose_error
+from brachium_body.rotation import angle_between
+from brachium_nodes.motions import pose_error
+from brachium_nodes.mounting import Worn
+from brachium_nodes.person import LONGEST_STAND_S, NEUTRAL_S, Person, PersonSettings
 from brachium_nodes.routines import ROUTINES
 from brachium_nodes.script import Span
 from brachium_nodes.wearer import Wearer, WearerSettings
@@ -42,6 +45,31 @@ def test_spans_follow_one_another_before_the_exercise(routine: str) -> None:
     exercise = Person(PersonSettings(exercise="shrugging")).posture(np.arange(6.0, 20.0, 0.1), "right")
     later = one.posture(np.arange(6.0, 20.0, 0.1) + one.begins_s - NEUTRAL_S, "right")
     assert np.ptp(later.shift[:, 2]) == pytest.approx(np.ptp(exercise.shift[:, 2]), rel=0.05)
+
+
+@pytest.mark.parametrize("routine", ["", "calibration-table", "wear-check"])
+def test_who_stands_longer_does_the_same_later(routine: str) -> None:
+    longer_s = 9.0
+    soon, late = (
+        Wearer(WearerSettings(level="typical", routine=routine, stand_s=NEUTRAL_S + more))
+        for more in (0.0, longer_s)
+    )
+    assert late.person.begins_s == soon.person.begins_s + longer_s
+    assert late.person.spans[0] == Span("n-pose", 0.0, NEUTRAL_S + longer_s)
+    assert late.person.spans[1:] == tuple(s.later(longer_s) for s in soon.person.spans[1:])
+    stood = late.truth(np.arange(0.0, NEUTRAL_S + longer_s - 3.0, 0.1), "right").angles
+    assert np.abs(stood - stood[0]).max() < 1e-9
+    t = np.arange(0.0, soon.person.begins_s + 5.0, 0.1)
+    assert late.truth(t + longer_s, "right").angles == pytest.approx(soon.truth(t, "right").angles, abs=1e-9)
+    then, now = (Worn.put_on("forearm_r", one.person, one.errors) for one in (soon, late))
+    apart = angle_between(then.pose(t, soon.person)[0], now.pose(t + longer_s, late.person)[0])
+    assert apart.max() < 1e-6, "straps settle when movement begins"
+
+
+@pytest.mark.parametrize("stand_s", [NEUTRAL_S - 0.1, LONGEST_STAND_S + 1.0, float("nan")])
+def test_nobody_stands_for_less_than_a_pose_takes_or_for_ever(stand_s: float) -> None:
+    with pytest.raises(ValueError, match=r"of standing cannot be used; give 4 to 3600 s"):
+        PersonSettings(stand_s=stand_s)
 
 
 @pytest.mark.parametrize("routine", NAMED)

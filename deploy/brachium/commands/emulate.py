@@ -60,6 +60,12 @@ def add_wearer(parser: argparse.ArgumentParser) -> None:
         help="what is done; an unknown name lists all; sensor-calibration: worn by nobody, to be calibrated",
     )
     parser.add_argument("--routine", help="what is done first; an unknown name lists all")
+    parser.add_argument(
+        "--stand",
+        type=real(),
+        metavar="S",
+        help="stand still for so long before all that: more than the 4 s there are, to be calibrated by hand",
+    )
     parser.add_argument("--arms", default="right", help="right, left or both")
     parser.add_argument(
         "--level", default="typical", help="sensor errors: exact (none), ideal, typical or patient"
@@ -106,6 +112,7 @@ def settings(args: argparse.Namespace, token: str) -> "EmulateSettings":
     from brachium_nodes.emulate_bench import EXERCISES
     from brachium_nodes.exercises import EXERCISES as WORN
     from brachium_nodes.link import FaultSettings
+    from brachium_nodes.person import NEUTRAL_S
     from brachium_nodes.shimmer.emulated_port import ShimmerTwin
     from brachium_nodes.wearer import WearerSettings
 
@@ -129,6 +136,7 @@ def settings(args: argparse.Namespace, token: str) -> "EmulateSettings":
         wearer=WearerSettings(
             exercise="elbow-flexion" if args.exercise in EXERCISES else args.exercise,
             routine=args.routine or "",
+            stand_s=NEUTRAL_S if args.stand is None else args.stand,
             arms=args.arms,
             level=args.level,
             seed=args.seed,

@@ -29,6 +29,8 @@ PICTURES = Path(os.environ.get("BRACHIUM_PICTURES", Path(__file__).parents[3] / 
 ROOM = "demo"
 UP_S = 90.0
 LOOK_S = 0.05
+STAND_S = 20.0
+"""Within it a screen must be told of the wearer and be used, however busy the machine is."""
 TOKEN = "of-this-test"
 DRESS = """async ([language, theme, percent]) => {
     const words = await import("/app/words.js");
@@ -92,11 +94,12 @@ class Network:
         process.wait()
 
     @contextmanager
-    def wearer(self, exercise: str = "elbow-flexion", routine: str = "standing") -> Iterator[None]:
-        """Somebody who stands for a while, or does another routine, and then an exercise for ever."""
+    def wearer(self, exercise: str = "elbow-flexion", routine: str = "") -> Iterator[None]:
+        """Somebody who stands for STAND_S, does a routine if there is one, and then an exercise for ever."""
         gateway = f"ws://127.0.0.1:{self.gateway}/node"
         way = ["--gateway", gateway, "--token-file", str(self.folder / "token")]
-        words = ["emulate", *self._network, *way, "--routine", routine, "--exercise", exercise]
+        moves = ["--stand", f"{STAND_S:g}", "--routine", routine, "--exercise", exercise]
+        words = ["emulate", *self._network, *way, *moves]
         self.processes.start("emulate", words, stderr=self.folder / "emulate.err")
         try:
             yield

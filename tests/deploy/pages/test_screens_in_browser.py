@@ -34,7 +34,7 @@ def test_with_a_keyboard_alone_through_a_guided_calibration_to_a_counted_set(scr
             assert page.evaluate("getComputedStyle(document.activeElement).boxShadow") != "none"
 
         one.open("/")
-        go("calibrate-guided")  # before the wearer comes, who stands still for 4 s only
+        go("calibrate-guided")
         with network.wearer(routine="calibration"):
             one.until(lambda: page.inner_text("#headline").startswith("3 "))
             page.keyboard.press("Enter")
