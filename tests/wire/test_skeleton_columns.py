@@ -27,6 +27,13 @@ USUAL = st.floats(-3.0, 3.0, width=32)
 NUMBER = st.one_of(*[USUAL] * 12, ANY)
 WHOLE = st.one_of(*[st.integers(0, 300)] * 6, st.integers(-(2**63), 2**64 - 1), ANY)
 
+MORE = st.recursive(
+    NUMBER,
+    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.sampled_from(["q", "seg", "more"]), inner),
+    max_leaves=6,
+)
+"""What a field holds that is not known here."""
+
 
 @st.composite
 def turn(draw: st.DrawFn) -> list[Any]:
@@ -61,8 +68,9 @@ def skeleton_map(draw: st.DrawFn) -> dict[str, Any]:
         value["aq"] = {"isb_plane": "assumed"}
     if draw(st.booleans()):
         value["rx"] = draw(WHOLE)
-    if draw(st.integers(0, 9)) == 0:
-        value["more"] = draw(NUMBER)
+    if draw(st.integers(0, 4)) == 0:
+        inside = draw(st.sampled_from([value, value["seg"]["hand_r"]]))
+        inside["more"] = draw(MORE)
     return value
 
 
@@ -203,6 +211,47 @@ def test_one_form_holds_many_and_decode_is_asked_once_for_each(monkeypatch: pyte
     columns, _ = collected([plain(i) for i in range(2000)])
     assert len(columns) == 2000
     assert len(columns.examples) == len(asked) == 3  # the sequence numbers take one, two and three bytes
+
+
+@pytest.mark.parametrize("more", [0.5, 300, [0.1, 200, {"x": 1.0}], {"q": {"q": [1.0]}, "seg": [2.0]}])
+def test_numbers_in_fields_that_are_not_known_make_no_form_of_their_own(more: Any) -> None:
+    def times(value: Any, i: int) -> Any:
+        if isinstance(value, list):
+            return [times(inner, i) for inner in value]
+        if isinstance(value, dict):
+            return {name: times(inner, i) for name, inner in value.items()}
+        return value * (1 + i % 200)
+
+    messages = [plain(200, more=times(more, i), t=10**18 + i) for i in range(1000)]
+    columns, refused = collected(messages)
+    assert refused == {}
+    assert len(columns.examples) <= 9  # a whole number takes one byte, two or four
+    assert_same(columns, one_by_one(messages)[0])
+
+
+@pytest.mark.parametrize(
+    "more",
+    [b"\x81\x90\x01", b"\x81\x80\x01", b"\x81\xa2\xff\xfe\x01", b"\xa2\xff\xfe", b"\xd4\xff\x00",
+     b"\xd4\x05\x00", b"\x81\xcb\x7f\xf8\0\0\0\0\0\0\x01", 900 * b"\x91" + b"\x01"],
+    ids=["list as key", "map as key", "key no text", "no text", "no time", "extension", "NaN as key", "deep"],
+)  # fmt: skip
+def test_whatever_a_field_holds_that_is_not_known_the_others_are_taken(more: bytes) -> None:
+    one = plain(1)
+    odd = bytes([one[0] + 1]) + one[1:] + b"\xa4more" + more
+    messages = [plain(0), odd, plain(2), odd]
+    columns, refused = collected(messages)
+    assert refused == {}
+    assert_same(columns, one_by_one(messages)[0])
+
+
+def test_one_nested_deeper_than_any_parser_goes_is_malformed(monkeypatch: pytest.MonkeyPatch) -> None:
+    one = plain(1)
+    payload = bytes([one[0] + 1]) + one[1:] + b"\xa4more" + 3000 * b"\x91" + b"\x01"
+    known = skeleton_columns.decode_skeleton(one, 8192)
+    monkeypatch.setattr(skeleton_columns, "decode_skeleton", lambda *_: known)  # newer Pythons go as deep
+    columns, refused = collected([plain(0), payload])
+    assert refused == {"malformed": 1}
+    assert len(columns) == 1
 
 
 def test_too_large_and_empty_ones_are_refused() -> None:

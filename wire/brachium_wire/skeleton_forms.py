@@ -6,12 +6,13 @@ messages at once and by the same rules.
 """
 
 from collections.abc import Iterator
-from typing import Any, Literal
+from typing import Union
 
 import msgpack
 import numpy as np
 import numpy.typing as npt
 
+from brachium_wire.codec import Drop, WireError
 from brachium_wire.messages import Skeleton
 from brachium_wire.plausible import LENGTH_TOLERANCE
 
@@ -21,17 +22,25 @@ Mask = npt.NDArray[np.bool_]
 Words = npt.NDArray[np.uint64]
 Bytes = npt.NDArray[np.uint8]
 
-Path = tuple[str | int, ...]
+Path = tuple[str | int | bytes, ...]
 """Where in a message a number stands, by names as on the wire: ("pos", "hand", 2)."""
+_Tree = dict[str | int | bytes, Union[int, "_Tree"]]
+"""The places of a message's numbers, in maps and lists as there."""
 
-# MessagePack's first bytes of numbers whose value is in the bytes that follow.
-_FLOAT: dict[int, str] = {0xCA: ">f4", 0xCB: ">f8"}
-_INTEGER: dict[int, str] = {
+_KINDS: dict[int, str] = {
+    0xCA: ">f4", 0xCB: ">f8",
     0xCC: ">u1", 0xCD: ">u2", 0xCE: ">u4", 0xCF: ">u8", 0xD0: ">i1", 0xD1: ">i2", 0xD2: ">i4", 0xD3: ">i8"
 }  # fmt: skip
+"""MessagePack's first bytes of numbers whose value is in the bytes that follow."""
 _SMALL = 0x80
 """Below it, the first byte is itself the number."""
+_NEGATIVE = 0xE0
+"""From it on, the first byte less 256 is the number."""
 _LARGEST = np.uint64((1 << 63) - 1)
+_TIMES: tuple[Path, ...] = (("t",), ("rx",))
+"""Too large for a double; of all other integers nothing but their size is asked."""
+_DEPTH = 4
+"""Maps and lists within one another in a skeleton's own fields; what is deeper is as in a form's first."""
 
 
 def padded(payloads: list[bytes]) -> Words:
@@ -44,49 +53,48 @@ class Form:
     """The skeletons that differ in nothing but their numbers, and the numbers of those that were taken."""
 
     def __init__(self, payload: bytes, example: Skeleton) -> None:
-        """`example` is what `decode` made of `payload`."""
+        """`example` is what `decode` made of `payload`. Raises WireError for one that is nested too deep."""
+        found = dict(_flat(_tree(payload)))
         self.example = example
-        self.columns: dict[Path, int] = {path: i for i, path in enumerate(_float_paths(example))}
-        self.integers: dict[Path, int] = {path: i for i, path in enumerate(_integer_paths(example))}
+        self.columns: dict[Path, int] = {p: i for i, p in enumerate(p for p in found if p not in _TIMES)}
+        self.integers: dict[Path, int] = {p: i for i, p in enumerate(p for p in found if p in _TIMES)}
         self.orders: list[Integers] = []
         self._floats: list[Floats] = []
         self._integers: list[Integers] = []
-        self._numbers(payload)
-        self._turns = np.array(
-            [
-                [self.columns[*path, i] for i in range(4)]
-                for path in dict.fromkeys(p[:-1] for p in self.columns if p[0] in ("trunk", "seg"))
-            ],
-            dtype=np.intp,
+        self._place(payload, found)
+        turns = dict.fromkeys(
+            p[:-1] for p in self.columns if p[0] == "trunk" or (p[0] == "seg" and p[2] in ("q", "sq"))
         )
+        self._turns = np.array([[self.columns[*path, i] for i in range(4)] for path in turns], dtype=np.intp)
 
-    def _numbers(self, payload: bytes) -> None:
-        """Find each number's place; those that have none of their own are what they are in this message."""
+    def _place(self, payload: bytes, found: dict[Path, int]) -> None:
+        """Note each number's bytes; those that have none of their own are what they are in this message."""
         self._constant_floats = np.full(len(self.columns), np.nan)
         self._constant_integers = np.zeros(len(self.integers), dtype=np.int64)
         mask = np.full(len(payload), 0xFF, dtype=np.uint8)
-        found = dict(_walk(payload))
         self._slots: list[tuple[bool, str, npt.NDArray[np.intp], npt.NDArray[np.intp]]] = []
         # Of floats or of integers, their kind, each one's bytes (k, size), and its column (k,).
-        for columns, constants, kinds in (
-            (self.columns, self._constant_floats, _FLOAT),
-            (self.integers, self._constant_integers, _INTEGER),
+        for floating, columns, constants in (
+            (True, self.columns, self._constant_floats),
+            (False, self.integers, self._constant_integers),
         ):
             places: dict[str, list[tuple[int, int]]] = {}
             for path, column in columns.items():
-                at, value = found[path]
-                if payload[at] < _SMALL:
+                at = found[path]
+                first = payload[at]
+                if first < _SMALL:
                     places.setdefault(">u1", []).append((at, column))
                     mask[at] = _SMALL  # any small number
-                elif (kind := kinds.get(payload[at])) is not None:
+                elif first >= _NEGATIVE:
+                    constants[column] = first - 256
+                else:
+                    kind = _KINDS[first]
                     places.setdefault(kind, []).append((at + 1, column))
                     mask[at + 1 : at + 1 + np.dtype(kind).itemsize] = 0
-                else:
-                    constants[column] = value
             for kind, some in places.items():
-                first, column_ = np.array(some, dtype=np.intp).T
-                bytes_ = first[:, None] + np.arange(np.dtype(kind).itemsize)
-                self._slots.append((kinds is _FLOAT, kind, bytes_, column_))
+                begin, column_ = np.array(some, dtype=np.intp).T
+                bytes_ = begin[:, None] + np.arange(np.dtype(kind).itemsize)
+                self._slots.append((floating, kind, bytes_, column_))
         self._mask = padded([mask.tobytes()])[0]
         self._fixed = padded([payload])[0] & self._mask
 
@@ -128,53 +136,43 @@ def _of_length_one(turns: Floats) -> Mask:
     return np.asarray((off <= LENGTH_TOLERANCE).all(axis=1))
 
 
-def _float_paths(skeleton: Skeleton) -> Iterator[Path]:
-    turns: list[Path] = [("trunk",)]
-    for name, pose in skeleton.segments.items():
-        turns += [("seg", name, "q")] if pose.world_from_segment is not None else []
-        turns += [("seg", name, "sq")] if pose.world_from_sensor is not None else []
-    vectors: list[Path] = [("pos", joint) for joint in skeleton.positions]
-    vectors += [("shift",)] if skeleton.shoulder_shift is not None else []
-    vectors += [("shiftsd",)] if skeleton.shoulder_shift_sd is not None else []
-    yield from ((*path, i) for path in turns for i in range(4))
-    yield from ((*path, i) for path in vectors for i in range(3))
-    yield from (("ang", name) for name in skeleton.angles)
-    yield from (("angsd", name) for name in skeleton.angle_sd)
+def _tree(payload: bytes) -> _Tree:
+    """Return where the message's numbers stand. Raises WireError for one that is nested too deep.
 
-
-def _integer_paths(skeleton: Skeleton) -> Iterator[Path]:
-    yield ("t",)
-    if skeleton.received_ns is not None:
-        yield ("rx",)
-    for name, pose in skeleton.segments.items():
-        if pose.sequence is not None:
-            yield ("seg", name, "seq")
-
-
-def _walk(payload: bytes) -> Iterator[tuple[Path, tuple[int, Any]]]:
-    """Yield each value that is neither map nor list: where it stands, its first byte's place, and itself.
-
-    Of a name that a map holds twice the last one counts, as `decode` has it.
+    Of a name that a map holds twice the last one counts, as `decode` has it. What is no number is passed
+    over: a field that is not known may hold anything.
     """
-    unpacker = msgpack.Unpacker(raw=False)
+    unpacker = msgpack.Unpacker(raw=False, unicode_errors="surrogateescape")
     unpacker.feed(payload)
 
-    def inner(path: Path) -> Iterator[tuple[Path, tuple[int, Any]]]:
+    def name() -> str | bytes:
         at = unpacker.tell()
-        match _kind(payload[at]):
-            case "map":
-                for _ in range(unpacker.read_map_header()):
-                    yield from inner((*path, unpacker.unpack()))
-            case "list":
-                for i in range(unpacker.read_array_header()):
-                    yield from inner((*path, i))
-            case _:
-                yield path, (at, unpacker.unpack())
+        if 0xA0 <= payload[at] <= 0xBF or 0xD9 <= payload[at] <= 0xDB:
+            return str(unpacker.unpack())
+        unpacker.skip()
+        return payload[at : unpacker.tell()]
 
-    return inner(())
+    def inner(depth: int) -> "int | _Tree":
+        at = unpacker.tell()
+        first = payload[at]
+        if depth and (0x80 <= first <= 0x8F or first in (0xDE, 0xDF)):
+            return {name(): inner(depth - 1) for _ in range(unpacker.read_map_header())}
+        if depth and (0x90 <= first <= 0x9F or first in (0xDC, 0xDD)):
+            return {i: inner(depth - 1) for i in range(unpacker.read_array_header())}
+        unpacker.skip()
+        return at if first < _SMALL or first >= _NEGATIVE or first in _KINDS else {}
+
+    try:
+        found = inner(_DEPTH)
+    except msgpack.StackError:
+        raise WireError(Drop.MALFORMED, "nested too deep") from None
+    assert isinstance(found, dict)
+    return found
 
 
-def _kind(first: int) -> Literal["map", "list", "value"]:
-    if 0x80 <= first <= 0x8F or first in (0xDE, 0xDF):
-        return "map"
-    return "list" if 0x90 <= first <= 0x9F or first in (0xDC, 0xDD) else "value"
+def _flat(tree: _Tree, path: Path = ()) -> Iterator[tuple[Path, int]]:
+    for name, inner in tree.items():
+        if isinstance(inner, dict):
+            yield from _flat(inner, (*path, name))
+        else:
+            yield (*path, name), inner
