@@ -8,7 +8,7 @@ from brachium_viewer.sessions.store import Store
 
 pytestmark = pytest.mark.network
 
-EXERCISE = {"exercise": "elbow-flexion", "side": "right"}
+EXERCISE = {"exercise": "elbow-flexion", "side": "right", "language": "de"}
 
 
 def recording_is(how: str):
@@ -46,7 +46,7 @@ def test_a_disk_that_fills_up_stops_the_recording_and_says_so_until_the_next_beg
         assert (await screen.ask("exercise", **EXERCISE))["ok"]
         assert (await hear(recording_is("on")))["alarms"] == []
         await asyncio.sleep(0.1)
-        done = await screen.ask("report")
+        done = await screen.ask("report", language="de")
         assert done["ok"], done
         assert done["data"]["ended"] == ""
         await hear(lambda m: m["kind"] == "state" and len(m["history"]) == 2)
@@ -55,6 +55,8 @@ def test_a_disk_that_fills_up_stops_the_recording_and_says_so_until_the_next_beg
         watch(serving.address, session)
     with Store.open(tmp_path) as store:
         assert [len(one.sets) for one in store.sessions("p01")] == [1, 1]
+    reports = [path.read_text("utf-8") for path in tmp_path.glob("*.html")]
+    assert ["Sitzung von p01" in report for report in reports] == [True, True]
 
 
 def test_the_alarm_outlives_the_session_that_it_ended(serve_pages, watch, moving_arm, disk, tmp_path):

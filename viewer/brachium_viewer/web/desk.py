@@ -145,7 +145,7 @@ class Desk:
             sets=asked.sets,
             repetitions=asked.repetitions,
         )
-        await self._sessions.begin(self._bus, subject, anew=True)
+        await self._sessions.begin(self._bus, subject, anew=True, language=asked.language)
         now_ns = self._instant_ns()
         self._state.begin(begins, now_ns)
         self._put(subject, begins, now_ns)

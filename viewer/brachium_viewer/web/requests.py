@@ -29,6 +29,8 @@ class Request(msgspec.Struct, frozen=True, kw_only=True, tag_field="verb"):
     """Base of all; `id` comes back with the answer."""
 
     id: int = 0
+    language: Annotated[str, msgspec.Meta(max_length=8)] = ENGLISH
+    """Of the page that asks, and so of a report that comes of it; English where there are no words of it."""
 
 
 class Calibrate(Request, frozen=True, kw_only=True, tag="calibrate"):
@@ -105,9 +107,6 @@ class Subject(Request, frozen=True, kw_only=True, tag="subject"):
 
 class Report(Request, frozen=True, kw_only=True, tag="report"):
     """End the session: close its recording and make its report."""
-
-    language: Annotated[str, msgspec.Meta(max_length=8)] = ENGLISH
-    """Of the report; English where there are no words of it."""
 
 
 Any = (

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from brachium_viewer import recorder
+from brachium_viewer.catalogue import ENGLISH
 from brachium_viewer.web import keeping
 from brachium_wire import keys
 from brachium_wire.bus import Bus
@@ -55,18 +56,18 @@ class SessionDesk:
         self.failure = ""
         """Why recording did not begin or stopped; until another one has begun."""
 
-    async def begin(self, bus: Bus, subject: str, *, anew: bool = False) -> None:
+    async def begin(self, bus: Bus, subject: str, *, anew: bool = False, language: str = ENGLISH) -> None:
         """Record from now on, if not yet. Raises NoRecording, and Unreached while nothing can be kept.
 
         One call at a time. Where a recording stopped by itself, only `anew` begins the next one: whoever
-        asks has seen the alarm.
+        asks has seen the alarm; what there was gets its report in `language`.
         """
         if self._thread is not None and self.failure:
             if not anew:
                 raise NoRecording(self.failure)
             await asyncio.to_thread(self.close)
             if self._closed is not None:
-                self._later(self._keep_aside(self._closed.path, subject))
+                self._later(self._keep_aside(self._closed.path, subject, language))
         if not await self.reached(bus):
             raise Unreached
         if self._thread is None:
@@ -156,10 +157,10 @@ class SessionDesk:
         log.error("%s", why)
         self.failure = why
 
-    async def _keep_aside(self, path: Path, subject: str) -> None:
+    async def _keep_aside(self, path: Path, subject: str, language: str) -> None:
         """Keep the session of a recording that stopped by itself while the next one runs."""
         try:
-            await asyncio.to_thread(keeping.apart, keeping.keep, path, subject)
+            await asyncio.to_thread(keeping.apart, keeping.keep, path, subject, language)
         except Exception as error:
             log.warning("%s is not among the sessions: %s; add it with brachium sessions", path, error)
         self._history = None, []

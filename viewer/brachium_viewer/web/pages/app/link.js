@@ -1,5 +1,7 @@
 // The line to the server: a WebSocket that comes back by itself. docs/web-protocol.md says what travels.
 
+import { language } from "./words.js";
+
 const FIRST_PAUSE_MS = 300;
 const LONGEST_PAUSE_MS = 5000;
 const ANSWER_MS = 320000;
@@ -64,7 +66,7 @@ export class Link {
     return new Promise((done) => {
       this.waiting.set(id, done);
       setTimeout(() => this.take({ kind: "answer", id, ok: false, reason: "" }), ANSWER_MS);
-      this.socket.send(JSON.stringify({ kind: "do", id, verb, ...words }));
+      this.socket.send(JSON.stringify({ kind: "do", id, verb, language, ...words }));
     });
   }
 }

@@ -152,7 +152,7 @@ $("mark").addEventListener("click", async () => {
 $("report").addEventListener("click", async () => {
   $("report-open").hidden = true;
   tell($("report-said"), { ok: true }, say("report.making"));
-  const answer = await busy($("report"), () => link.ask("report", { language }));
+  const answer = await busy($("report"), () => link.ask("report"));
   const notes = [answer.data?.ended, answer.data?.why].filter(Boolean).map(told).join(" ");
   tell($("report-said"), answer, `${say("report.done", { file: answer.data?.recording ?? "" })} ${notes}`);
   if (!answer.ok) return;
