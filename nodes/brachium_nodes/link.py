@@ -191,11 +191,6 @@ def lost_samples(
     raise AssertionError("departures never end")
 
 
-def burst_faults(share: float, packets: int = 5) -> FaultSettings:
-    """Return faults that lose this share of all packets, in bursts of `packets`."""
-    return FaultSettings(burst_loss=share / (packets - share * (packets - 1)), burst_packets=packets)
-
-
 def _draws(faults: FaultSettings, period_s: float, seed: int, segment: str) -> Iterator[tuple[float, str]]:
     """Yield delay in s and fate of one packet after the other."""
     wifi, random = WIFI[faults.wifi], generator(seed, segment, "link")
