@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from brachium_viewer.exercises import EXERCISES
+from brachium_viewer.report import words
 
 PAGES = Path(__file__).parent / "web" / "words"
 REPORT = Path(__file__).parent / "report" / "words"
@@ -124,7 +125,7 @@ def catalogue(language: str) -> Catalogue:
         raise ValueError(f"there is no report in {language!r}; choose one of {', '.join(LANGUAGES)}")
     pages = json.loads((PAGES / f"{language}.json").read_text(encoding="utf-8"))
     sentences = {key: text for key, text in pages.items() if " " in key}
-    sentences |= {name.replace("-", " "): pages[f"exercise.{name}"] for name in EXERCISES}
+    sentences |= {words.exercise(name): pages[f"exercise.{name}"] for name in EXERCISES}
     sentences |= json.loads((REPORT / f"{language}.json").read_text(encoding="utf-8"))
     kinds = ("segment.", "side.")
     return Catalogue(

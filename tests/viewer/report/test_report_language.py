@@ -14,7 +14,7 @@ from brachium_body.segments import SEGMENTS
 from brachium_viewer import catalogue as c
 from brachium_viewer.exercises import EXERCISES, PLANES_DEG
 from brachium_viewer.marks import Mode, When
-from brachium_viewer.report import page
+from brachium_viewer.report import page, words
 from brachium_viewer.report.language import in_language
 
 VIEWER = Path(brachium_viewer.__file__).parent
@@ -170,7 +170,7 @@ def test_sentences_within_sentences(english, german):
 
 
 def test_every_exercise_is_called_as_on_the_pages():
-    words = json.loads((c.PAGES / "de.json").read_text("utf-8"))
+    pages = json.loads((c.PAGES / "de.json").read_text("utf-8"))
     for name in EXERCISES:
-        english = name.replace("-", " ")
-        assert c.catalogue("de").told(english) in (words[f"exercise.{name}"], lines("de").get(english))
+        english = words.exercise(name)
+        assert c.catalogue("de").told(english) in (pages[f"exercise.{name}"], lines("de").get(english))

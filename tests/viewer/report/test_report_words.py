@@ -6,6 +6,7 @@ from types import SimpleNamespace
 from typing import Any
 
 from brachium_viewer.catalogue import catalogue
+from brachium_viewer.exercises import exercise
 from brachium_viewer.report import page, sentences, words
 from brachium_wire.messages import Calibration
 
@@ -31,6 +32,12 @@ def test_scores_are_words_with_units() -> None:
 
 def test_a_score_without_words_keeps_its_name() -> None:
     assert words.score("elbow_share", 0.51234) == "elbow share 0.512"
+
+
+def test_an_exercise_that_no_table_holds_is_said_in_words() -> None:
+    said = words.movement(exercise("stirring").name, "left")
+    assert said == "free movement, left"
+    assert catalogue("de").told(said) == "Freie Bewegung, links"
 
 
 def test_one_repetition_is_said_as_one(scripts: Any, tmp_path: Path) -> None:

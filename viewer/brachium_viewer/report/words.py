@@ -1,4 +1,4 @@
-"""Every word of the report that is not in its template: one place for a catalogue to translate."""
+"""What the report calls things by: measures, angles, exercises, and why a set ended. Pure."""
 
 from collections.abc import Mapping
 
@@ -61,7 +61,7 @@ def ended(how: str, reason: str = "") -> str:
 
 def exercise(name: str) -> str:
     """Return an exercise's name as people read it."""
-    return name.replace("-", " ")
+    return "free movement" if name == "free" else name.replace("-", " ")
 
 
 def movement(name: str, side: str, mode: str = "") -> str:
