@@ -39,9 +39,10 @@ def numbers(data: CaptureSegment) -> npt.NDArray[np.int64]:
 
 
 def batches(capture: Capture, until_s: float | None = None) -> Iterator[tuple[str, Samples]]:
-    """Yield all segments' samples in small batches, in order of their last sample's time. A gap in time
-    never lies
-    within a batch."""
+    """Yield all segments' samples in small batches, in order of their last sample's time.
+
+    A gap in time never lies within a batch.
+    """
     pieces: list[tuple[float, Segment, int, int]] = []
     counted: dict[str, npt.NDArray[np.int64]] = {}
     for segment, data in capture.segments.items():

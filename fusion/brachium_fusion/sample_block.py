@@ -83,14 +83,45 @@ class Block:
             return times[i - 1], times[i], quats[i - 1], quats[i]
         return times[-1], self.times[0], quats[-1], self.quats[0]
 
+    def state(self) -> list[Any]:
+        """Return it as plain values."""
+        return [
+            self.before_ns,
+            self.before.tolist(),
+            self.times,
+            self.quats.ravel().tolist(),
+            None if self.moved is None else self.moved.rows().ravel().tolist(),
+            self.first_sequence,
+            self.received_ns,
+            self.gap,
+            self.disturbed,
+            None if self.carried is None else self.carried.state(),
+        ]
 
-def moved_of(rows: Floats) -> Moved:
+
+def block_of(state: list[Any]) -> Block:
+    """Return the block whose state this is."""
+    before_ns, before, times, quats, rows, sequence, received_ns, gap, disturbed, *carried = state
+    return Block(
+        before_ns,
+        np.array(before),
+        times,
+        np.reshape(quats, (-1, 4)),
+        None if rows is None else _moved(np.reshape(rows, (-1, 6))),
+        sequence,
+        received_ns,
+        gap,
+        disturbed,
+        _carried(carried[0]) if carried else None,
+    )
+
+
+def _moved(rows: Floats) -> Moved:
     """Return what gave these rows (n + 1, 6)."""
     return Moved(rows[1:, :3], rows[1:, 3:], (rows[:1, :3], rows[:1, 3:]))
 
 
-def carried_of(state: list[Any] | None) -> Carried | None:
-    """Return what gave this state."""
+def _carried(state: list[Any] | None) -> Carried | None:
     if state is None:
         return None
     times, quats, rows = state

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from brachium_fusion.sample_block import Block, carried_of, moved_of
+from brachium_fusion.sample_block import Block, block_of
 from brachium_wire.messages import Quality
 
 Floats = npt.NDArray[np.float64]
@@ -172,47 +172,8 @@ class Timeline:
 
     def state(self) -> list[Any]:
         """Return all that is held, as plain values."""
-        return [
-            [
-                b.before_ns,
-                b.before.tolist(),
-                b.times,
-                b.quats.ravel().tolist(),
-                None if b.moved is None else b.moved.rows().ravel().tolist(),
-                b.first_sequence,
-                b.received_ns,
-                b.gap,
-                b.disturbed,
-                None if b.carried is None else b.carried.state(),
-            ]
-            for b in self._blocks
-        ]
+        return [block.state() for block in self._blocks]
 
     def restore(self, state: list[Any]) -> None:
         """Go on as the timeline whose state this is would have."""
-        self._blocks = deque(
-            Block(
-                before_ns,
-                np.array(before),
-                times,
-                np.array(quats).reshape(-1, 4),
-                None if rows is None else moved_of(np.array(rows).reshape(-1, 6)),
-                sequence,
-                received_ns,
-                gap,
-                disturbed,
-                carried_of(carried[0]) if carried else None,
-            )
-            for (
-                before_ns,
-                before,
-                times,
-                quats,
-                rows,
-                sequence,
-                received_ns,
-                gap,
-                disturbed,
-                *carried,
-            ) in state
-        )
+        self._blocks = deque(map(block_of, state))
