@@ -5,10 +5,14 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
+from brachium_viewer import figures as f
 from brachium_viewer.catalogue import catalogue
+from brachium_viewer.contents import Contents, SensorContents
 from brachium_viewer.exercises import exercise
 from brachium_viewer.report import page, sentences, words
-from brachium_wire.messages import Calibration
+from brachium_viewer.report import report_tables as tables
+from brachium_wire.messages import Calibration, Info
+from brachium_wire.sequence import SequenceCounter
 
 
 def report_of(calibration: Calibration) -> Any:
@@ -38,6 +42,18 @@ def test_an_exercise_that_no_table_holds_is_said_in_words() -> None:
     said = words.movement(exercise("stirring").name, "left")
     assert said == "free movement, left"
     assert catalogue("de").told(said) == "Freie Bewegung, links"
+
+
+def test_a_sensor_that_delivered_nothing_has_no_share_lost() -> None:
+    silent = SensorContents(info=Info(node="n1", rate_hz=100.0, origin="worn", host="h"))
+    heard = SensorContents(counted=SequenceCounter(received=60, lost=40))
+    contents = Contents(sensors={("p01", "forearm_r"): silent, ("p01", "hand_r"): heard})
+    rows = tables.quality(f.segments(contents), {}, {}).rows
+    assert rows == [
+        ["forearm r", "n1", "none", tables.NONE, tables.NONE, tables.NONE],
+        ["hand r", tables.NONE, "60", "40.00", "0", tables.NONE],
+    ]
+    assert catalogue("de").told("none") == "keine"
 
 
 def test_one_repetition_is_said_as_one(scripts: Any, tmp_path: Path) -> None:

@@ -226,17 +226,16 @@ def ratings(found: Iterable[Rating]) -> list[str]:
 def quality(
     segments: dict[str, SegmentFigures], batteries: dict[str, float | None], gaps: dict[str, float]
 ) -> PageTable:
-    """Return each sensor's samples and battery."""
+    """Return each sensor's samples and battery; one that delivered nothing has no share that was lost."""
     rows = []
     for who, s in segments.items():
         level = batteries.get(who)
+        counts = [str(s.received), f"{s.loss_percent:.2f}", str(s.out_of_order)]
         rows.append(
             [
                 who.split("/", 1)[1].replace("_", " "),
                 s.node or NONE,
-                str(s.received),
-                f"{s.loss_percent:.2f}",
-                str(s.out_of_order),
+                *(counts if s.received or s.lost else ["none", NONE, NONE]),
                 NONE if level is None else f"{100 * level:.0f}",
             ]
         )
