@@ -13,7 +13,7 @@ from brachium_viewer.web import server
 from brachium_wire import keys
 from brachium_wire.bus import Bus
 from brachium_wire.codec import encode
-from brachium_wire.messages import Info
+from brachium_wire.messages import Calibration, Info
 
 START_S = 40.0
 
@@ -108,21 +108,36 @@ def watch() -> Callable[..., None]:
 
 
 @pytest.fixture
-def moving_arm(router_endpoint: str, arm_at):
-    """A router beside which an emulated right arm is published at 50 Hz; its endpoint."""
-    stop = threading.Event()
+def wear(router_endpoint: str, arm_at) -> Callable[..., AbstractContextManager[str]]:
+    """A router beside which an arm with such sensors swings, at 50 Hz, as a context manager; its endpoint."""
 
-    def publish() -> None:
-        with Bus.open(router_endpoint) as bus:
-            info = Info(node="n", rate_hz=100.0, origin="emulated", host="h")
-            bus.retain(keys.info("lab", "p01", "forearm_r"), encode(info))
-            number = 0
-            while not stop.wait(0.02):
-                number += 1
-                bus.put(keys.skeleton("lab", "p01", "right"), encode(arm_at(0.02 * number)))
+    @contextmanager
+    def worn(*segments: str, speed: float = 1.0, calibration: Calibration | None = None) -> Iterator[str]:
+        stop = threading.Event()
 
-    thread = threading.Thread(target=publish)
-    thread.start()
-    yield router_endpoint
-    stop.set()
-    thread.join(5.0)
+        def publish() -> None:
+            with Bus.open(router_endpoint) as bus:
+                for segment in segments:
+                    info = Info(node=segment, rate_hz=100.0, origin="emulated", host="h")
+                    bus.retain(keys.info("lab", "p01", segment), encode(info))
+                if calibration is not None:
+                    bus.retain(keys.calibration("lab", "p01"), encode(calibration))
+                number = 0
+                while not stop.wait(0.02):
+                    number += 1
+                    bus.put(keys.skeleton("lab", "p01", "right"), encode(arm_at(0.02 * speed * number)))
+
+        thread = threading.Thread(target=publish)
+        thread.start()
+        yield router_endpoint
+        stop.set()
+        thread.join(5.0)
+
+    return worn
+
+
+@pytest.fixture
+def moving_arm(wear) -> Iterator[str]:
+    """A router beside which an emulated right arm with one sensor swings; its endpoint."""
+    with wear("forearm_r") as endpoint:
+        yield endpoint

@@ -1,15 +1,11 @@
 """The therapist's page in a real Chromium: it shows, counts and warns, and asks nobody else for anything."""
 
-import threading
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
-from brachium_wire import keys
-from brachium_wire.bus import Bus
-from brachium_wire.codec import encode
-from brachium_wire.messages import Calibration, Info
+from brachium_wire.messages import Calibration
 
 sync_api = pytest.importorskip("playwright.sync_api")
 
@@ -19,26 +15,11 @@ PATIENCE_MS = 60_000
 
 
 @pytest.fixture
-def wearer(router_endpoint: str, arm_at) -> Iterator[str]:
+def wearer(wear) -> Iterator[str]:
     """A router, and an arm that bends its elbow with three sensors on it; the router's endpoint."""
-    stop = threading.Event()
-
-    def publish() -> None:
-        with Bus.open(router_endpoint) as bus:
-            for segment in ("upper_arm_r", "forearm_r", "hand_r"):
-                info = Info(node=segment, rate_hz=100.0, origin="emulated", host="h")
-                bus.retain(keys.info("lab", "p01", segment), encode(info))
-            bus.retain(keys.calibration("lab", "p01"), encode(Calibration(time_ns=1, state="done")))
-            number = 0
-            while not stop.wait(0.02):
-                number += 1
-                bus.put(keys.skeleton("lab", "p01", "right"), encode(arm_at(0.06 * number)))
-
-    thread = threading.Thread(target=publish)
-    thread.start()
-    yield router_endpoint
-    stop.set()
-    thread.join(5.0)
+    done = Calibration(time_ns=1, state="done")
+    with wear("upper_arm_r", "forearm_r", "hand_r", speed=3.0, calibration=done) as endpoint:
+        yield endpoint
 
 
 class Watched:
