@@ -1,6 +1,6 @@
 """A subject's calibration: what is known, what is waited for, and what is told of it. Pure."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from brachium_fusion.guided import FITTING, WORDS, FitRequest, Guided, GuidedWish, Told
 from brachium_fusion.pose import Alignment, PoseSensor, align, pose_orientations
-from brachium_fusion.pose_watch import STILL_S, HeldPose, PoseWatch, PoseWish
+from brachium_fusion.pose_watch import STILL_S, HeldPose, Moving, PoseWatch, PoseWish
 from brachium_fusion.timeline import Reading
 from brachium_fusion.track import SegmentTrack
 from brachium_fusion.zero import zeroed
@@ -49,7 +49,7 @@ class Calibrating:
         routine, motions = data.pop("routine", "pose"), tuple(data.pop("motions", ()))
         wish = PoseWish(from_ns=now, patient=False, **data)
         self._watch = PoseWatch(wish) if routine == "pose" else Guided(GuidedWish(pose=wish, motions=motions))
-        self.say(now, "waiting", pose=wish.pose, motion=wish.pose, reason=WORDS[wish.pose])
+        self._say_waiting(now, wish, [])
         return False
 
     def _take_found(self, now: int, data: dict[str, Any]) -> bool:
@@ -114,6 +114,9 @@ class Calibrating:
         seen = watch.see(now, live, {s: tracks[s].still_since_ns for s in live})
         if seen is None:
             return False
+        if isinstance(seen, Moving):
+            self._say_waiting(now, watch.wish, seen.segments)
+            return False
         self._watch = None
         if isinstance(seen, str):
             self.say(now, "refused", pose=watch.wish.pose, reason=seen)
@@ -127,13 +130,15 @@ class Calibrating:
         self,
         now: int,
         guided: Guided,
-        seen: Told | FitRequest | str | None,
+        seen: Told | Moving | FitRequest | str | None,
         tracks: Mapping[str, SegmentTrack],
         session: Session,
     ) -> bool:
         pose = guided.wish.pose.pose
         if isinstance(seen, Told):
             self.say(now, "running", pose=pose, motion=seen.step, progress=seen.progress, reason=seen.words)
+        elif isinstance(seen, Moving):
+            self._say_waiting(now, guided.wish.pose, seen.segments)
         elif isinstance(seen, FitRequest):
             self._watch, self._fitting_ns = None, seen.from_ns
             self.fits.append(guided.complete(seen, tracks, session.facing_deg))
@@ -159,6 +164,9 @@ class Calibrating:
         targets = pose_orientations(held.pose, held.angles_deg)
         self.alignment = align(sensors, targets, facing_deg=session.facing_deg)
 
+    def _say_waiting(self, now: int, wish: PoseWish, moving: list[str]) -> None:
+        self.say(now, "waiting", pose=wish.pose, motion=wish.pose, reason=WORDS[wish.pose], moving=moving)
+
     def say(
         self,
         now: int,
@@ -169,6 +177,7 @@ class Calibrating:
         progress: float = 0.0,
         reason: str = "",
         refused: Mapping[str, str] | None = None,
+        moving: Sequence[str] = (),
     ) -> None:
         """Tell how far it has come, and what is known."""
         alignment = self.alignment or Alignment()  # what was known before still holds when a pose is refused
@@ -185,6 +194,7 @@ class Calibrating:
                 scores=alignment.scores,
                 warnings=list(alignment.warnings),
                 refused=dict(refused or {}),
+                moving=list(moving),
             )
         )
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from brachium_fusion.motion_record import MotionRecord
 from brachium_fusion.pose import Alignment
-from brachium_fusion.pose_watch import HeldPose, PoseWatch, PoseWish
+from brachium_fusion.pose_watch import HeldPose, Moving, PoseWatch, PoseWish
 from brachium_fusion.sensor_to_segment import SensorRecord, Span, align_segments
 from brachium_fusion.timeline import Reading
 from brachium_fusion.track import SegmentTrack
@@ -132,11 +132,11 @@ class Guided:
 
     def see(
         self, now: int, live: Mapping[str, Reading], tracks: Mapping[str, SegmentTrack]
-    ) -> Told | FitRequest | str | None:
+    ) -> Told | Moving | FitRequest | str | None:
         """Take the sensors that are there at an instant.
 
-        Return what to do now when that changed, in the end what to find the alignment from, or why it was
-        refused.
+        Return what to do now or who moves when that changed, in the end what to find the alignment from, or
+        why it was refused.
         """
         if now - self._last_ns < RECORD_NS:
             return None
@@ -149,11 +149,10 @@ class Guided:
 
     def _pose(
         self, now: int, live: Mapping[str, Reading], tracks: Mapping[str, SegmentTrack]
-    ) -> Told | FitRequest | str | None:
+    ) -> Told | Moving | FitRequest | str | None:
         held = self._watch.see(now, live, {s: tracks[s].still_since_ns for s in live})
-        if held is None or isinstance(held, str):
+        if not isinstance(held, HeldPose):
             return held
-        assert isinstance(held, HeldPose)
         count = max(len(quats) for quats in held.world_from_sensor.values())
         end = len(self._record.times_ns)
         pose = self.wish.pose

@@ -18,6 +18,10 @@ POSE_USED_NS = 2_000_000_000
 """Of the pose, the last two seconds are used: the filters have settled by then."""
 POSE_PATIENCE_S = 30.0
 """A pose that was asked for is refused when nobody stood still for this long."""
+MOVED_NS = 500_000_000
+"""Whoever moved within this is moving: an arm that swings is still for an instant at each end."""
+TOLD_NS = 1_000_000_000
+"""Who moves is told no more often, and not before a person had this long to come to rest."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -41,12 +45,19 @@ class HeldPose(NamedTuple):
     """Per segment (k, 4), while it was held."""
 
 
+class Moving(NamedTuple):
+    """Whose sensors a pose that was asked for waits for; nobody's any more where there are none."""
+
+    segments: list[str]
+
+
 class PoseWatch:
     """Collects orientations as long as all sensors are still."""
 
     def __init__(self, wish: PoseWish) -> None:
         self.wish = wish
         self._held: dict[str, list[tuple[int, Floats]]] = {}
+        self._told, self._told_ns = Moving([]), wish.from_ns
 
     def forget(self, segment: str) -> None:
         """Leave aside what a sensor showed that is not there any more."""
@@ -54,10 +65,11 @@ class PoseWatch:
 
     def see(
         self, now: int, live: Mapping[str, Reading], still_since: Mapping[str, int]
-    ) -> HeldPose | str | None:
+    ) -> HeldPose | Moving | str | None:
         """Take the sensors that are there at an instant, and since when each is still, host time ns.
 
-        Return the pose once it was held, or why it was refused; None while it is waited for.
+        Return the pose once it was held, or why it was refused; while it is waited for None, or who moves
+        when that changed.
         """
         wish = self.wish
         start = max((still_since[s] for s in live), default=now + 1)
@@ -77,13 +89,21 @@ class PoseWatch:
                 f"{moving} was not still for {wish.seconds:g} s within {POSE_PATIENCE_S:g} s; "
                 "stand still (slower than 0.15 rad/s) and ask again"
             )
-        return None
+        return None if wish.patient else self._moving(now, live, still_since)
+
+    def _moving(self, now: int, live: Mapping[str, Reading], still_since: Mapping[str, int]) -> Moving | None:
+        moving = Moving(sorted(s for s in live if now - still_since[s] < MOVED_NS))
+        if moving == self._told or now - self._told_ns < TOLD_NS:
+            return None
+        self._told, self._told_ns = moving, now
+        return moving
 
     def state(self) -> dict[str, Any]:
         """Return all that changes, as plain values."""
         return {
             "wish": asdict(self.wish),
             "held": {s: [[t, q.tolist()] for t, q in rows] for s, rows in self._held.items()},
+            "told": [self._told.segments, self._told_ns],
         }
 
     @staticmethod
@@ -91,4 +111,6 @@ class PoseWatch:
         """Return the watch whose state this is."""
         watch = PoseWatch(PoseWish(**state["wish"]))
         watch._held = {s: [(t, np.array(q)) for t, q in rows] for s, rows in state["held"].items()}
+        segments, watch._told_ns = state["told"]
+        watch._told = Moving(segments)
         return watch

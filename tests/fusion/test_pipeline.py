@@ -632,8 +632,9 @@ def test_a_pose_that_nobody_holds_is_refused_with_the_name_of_who_moved(made) ->
         Settings(auto_pose=False),
         changes=[Change(made.START, "calibrate", wish)],
     )
-    states = [c.state for _, c in pipeline.calibrations]
-    assert states == ["waiting", "refused"]
+    told = [(c.state, c.moving) for _, c in pipeline.calibrations]
+    assert told == [("waiting", []), ("waiting", ["forearm_r"]), ("refused", [])]
+    assert (pipeline.calibrations[1][1].time_ns - made.START) // MS in (999, 1_000, 1_001)
     last = pipeline.calibrations[-1][1]
     assert "forearm_r was not still" in last.reason
     assert last.time_ns - made.START == pytest.approx(33_000 * MS, abs=2 * TICK)

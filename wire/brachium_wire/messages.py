@@ -1,7 +1,4 @@
-"""What travels: frozen records in SI units. Short names are those on the wire, docs/wire.md explains each.
-
-A number that was not measured is absent or nil; it is never 0 and never NaN.
-"""
+"""What travels, in SI units (docs/wire.md). A number not measured is absent or nil, never 0 and never NaN."""
 
 from typing import Any, Literal
 
@@ -190,6 +187,8 @@ class Calibration(Message, frozen=True, kw_only=True, tag="calibration/1"):
     """What a person should know, one line each."""
     refused: dict[str, str] = msgspec.field(default_factory=dict)
     """What could not be found, by name, and the reason: one line that says what to do."""
+    moving: list[str] = msgspec.field(default_factory=list)
+    """Segments whose sensors are not still yet while a pose is waited for."""
     sensor: SensorProgress | None = None
     """The sensor that is being calibrated by itself, or was last."""
     sensors: dict[str, SensorCalibration] = msgspec.field(default_factory=dict)

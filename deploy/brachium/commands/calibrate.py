@@ -144,7 +144,8 @@ def _line(news: "Calibration") -> str:
     """Return what to do now; empty once it is over."""
     if news.state not in ("waiting", "running"):
         return ""
-    return f"{round(100 * news.progress):3d} %  {news.reason}"
+    moving = f"; not still yet: {', '.join(news.moving)}" if news.moving else ""
+    return f"{round(100 * news.progress):3d} %  {news.reason}{moving}"
 
 
 def _words(data: dict[str, Any]) -> str:

@@ -97,6 +97,7 @@ def calibration(news: Calibration | None) -> Json | None:
         "scores": {name: round(value, 2) for name, value in news.scores.items()},
         "warnings": news.warnings,
         "refused": news.refused,
+        "moving": news.moving,
         "wear": None if news.wear is None else msgspec.to_builtins(news.wear),
     }
 

@@ -15,6 +15,11 @@ function seat({ segment, seat: place, turn, fine }) {
   return say("wear.turned", { segment: name, turn: say(`turn.${turn || "both"}`) });
 }
 
+/** Whom a pose waits for; empty when nobody moves. */
+function restless({ moving }) {
+  return moving.length ? ` ${say("moving", { segments: moving.map((name) => say(`segment.${name}`)).join(", ") })}` : "";
+}
+
 export class Calibration {
   constructor(link) {
     this.link = link;
@@ -60,7 +65,7 @@ export class Calibration {
     }
     if (news === null || !RUNNING.has(news.state) || !(this.asked || news.state === "running")) return null;
     const key = `motion.${news.motion || news.pose}`;
-    return { words: has(key) ? say(key) : told(news.reason), progress: news.progress };
+    return { words: (has(key) ? say(key) : told(news.reason)) + restless(news), progress: news.progress };
   }
 
   show(news) {

@@ -150,7 +150,10 @@ export class Screens {
     const { busy, refused } = this.mine;
     const far = state?.calibration?.progress ?? 0;
     const done = this.calibrated() && !busy && !refused;
-    texted(id("still-what"), say(busy ? "patient.still.now" : done ? "patient.still.done" : "patient.still.what"));
+    const moving = state?.calibration?.moving ?? [];
+    const parts = [...new Set(moving.map((name) => say(`patient.part.${part(name)}`)))].join(", ");
+    const now = parts ? say("patient.still.moving", { parts }) : say("patient.still.now");
+    texted(id("still-what"), busy ? now : say(done ? "patient.still.done" : "patient.still.what"));
     id("still-far").hidden = !busy;
     id("still-far").value = this.calibrated() ? 0 : far;
   }
