@@ -169,6 +169,7 @@ def disk(monkeypatch: pytest.MonkeyPatch) -> SimpleNamespace:
 
 
 BLANK = re.compile(r"\{[^{}]*\}")
+WORD = re.compile(r"[A-Za-z']+")
 
 
 def literals(path: Path) -> Iterator[str]:
@@ -202,3 +203,24 @@ def literals(path: Path) -> Iterator[str]:
 def texts_in() -> Callable[[Path], list[str]]:
     """The texts in a module's code, f-strings with `{}` for each value."""
     return lambda path: list(literals(path))
+
+
+def is_sentence(text: str) -> bool:
+    """Two words or more; a key, a unit or a name is one."""
+    return sum(WORD.fullmatch(word.strip(",.;:()?")) is not None for word in text.split()) >= 2
+
+
+@pytest.fixture(scope="session")
+def check_lines() -> Callable[[dict[str, str], set[str], set[str], set[str]], None]:
+    """Holds of a catalogue's lines that each sentence of `said` but those of `elsewhere` has one, that each
+    line is of a text of `said` or `made`, and that none has blanks that its sentence has not."""
+
+    def check(lines: dict[str, str], said: set[str], elsewhere: set[str], made: set[str]) -> None:
+        keys = {BLANK.sub("{}", key) for key in lines}
+        assert sorted({text for text in said if is_sentence(text)} - elsewhere - keys) == []
+        assert sorted(keys - said - made) == []
+        for key, text in lines.items():
+            assert set(BLANK.findall(text)) <= set(BLANK.findall(key)), key
+            assert text.strip(), key
+
+    return check
