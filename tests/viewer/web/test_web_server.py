@@ -79,7 +79,7 @@ def test_a_session_from_its_first_rating_to_the_store(serve_pages, watch, moving
         assert store.history("p01", "elbow-flexion", "right") == ()
 
 
-def test_what_cannot_be_asked_is_refused_in_one_line(serve_pages, watch, moving_arm, tmp_path):
+def test_what_cannot_be_asked_is_refused_in_one_line(serve_pages, watch, moving_arm, tmp_path, caplog):
     async def ask(screen):
         await screen.until(lambda m: m["kind"] == "state" and m["sides"])
         for verb, words in (
@@ -96,14 +96,16 @@ def test_what_cannot_be_asked_is_refused_in_one_line(serve_pages, watch, moving_
             assert not answer["ok"], (verb, words)
             assert answer["verb"] == verb
             assert "\n" not in answer["reason"]
+            assert ("load the page anew" in answer["reason"]) == (verb != "subject")
         await screen.socket.send_str("not json")
         broken = await screen.until(lambda m: m["kind"] == "answer" and m["id"] == 0)
-        assert "cannot be asked" in broken["reason"]
+        assert broken["reason"] == "the server does not know what this page asks: load the page anew"
         assert (await screen.ask("wear-check"))["reason"].endswith("brachium wear-check --subject p01")
         assert "fusion does not answer" in (await screen.ask("zero"))["reason"]
 
     with serve_pages(endpoint=moving_arm, sessions=tmp_path, open_door=True) as serving:
         watch(serving.address, ask)
+    assert "`int` <= 10" in caplog.text  # what is wrong is for whoever wrote the page
 
 
 def test_a_new_subject_is_told_to_the_room(serve_pages, watch, moving_arm, tmp_path):

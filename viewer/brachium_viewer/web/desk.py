@@ -47,6 +47,7 @@ class Desk:
             verb, number = str(asked.__struct_config__.tag), asked.id
             data = await self._do(asked)
         except r.BadRequest as error:
+            log.warning("a page asked for %r: %s", error.verb, error.wrong)
             return _answer(error.id, error.verb, reason=str(error))
         except ValueError as error:  # every part's own words on what cannot be
             return _answer(number, verb, reason=str(error))

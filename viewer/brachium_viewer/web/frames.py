@@ -78,7 +78,8 @@ def sensor(node: NodeHealth) -> Json:
         "slow": node.nominal_hz is not None and node.rate_hz < SLOW * node.nominal_hz,
         "loss_percent": round(100.0 * node.loss),
         "battery_hours": None if node.battery_hours is None else round(node.battery_hours, 1),
-        "battery_low": node.battery_hours is not None and is_low(node.battery_hours),
+        "battery_percent": None if node.battery_level is None else round(100.0 * node.battery_level),
+        "battery_low": is_low(node.battery_hours),
         "rssi_dbm": node.rssi_dbm,
     }
 

@@ -18,11 +18,11 @@ Words = Annotated[str, msgspec.Meta(max_length=500)]
 
 
 class BadRequest(ValueError):
-    """What cannot be asked, in one line; `id` and `verb` as far as they can be read."""
+    """What cannot be asked; `id` and `verb` as far as they can be read, and what is wrong for the log."""
 
-    def __init__(self, text: str, head: "Head") -> None:
-        super().__init__(text)
-        self.id, self.verb = head.id, head.verb
+    def __init__(self, wrong: str, head: "Head") -> None:
+        super().__init__("the server does not know what this page asks: load the page anew")
+        self.wrong, self.id, self.verb = wrong, head.id, head.verb
 
 
 class Request(msgspec.Struct, frozen=True, kw_only=True, tag_field="verb"):
@@ -140,7 +140,7 @@ def read(text: str) -> Any:
     try:
         return _decoder.decode(text)
     except (msgspec.DecodeError, UnicodeEncodeError) as error:
-        raise BadRequest(f"this cannot be asked: {error}", _head(text)) from None
+        raise BadRequest(str(error), _head(text)) from None
 
 
 def _head(text: str) -> Head:

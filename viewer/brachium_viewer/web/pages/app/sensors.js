@@ -45,9 +45,14 @@ function more(sensor) {
 }
 
 function stateOf(sensor) {
-  const words = say(`sensor.${sensor.state}`);
-  if (sensor.battery_hours == null || sensor.battery_low) return words;
-  return `${words} · ${say("battery", { hours: number(sensor.battery_hours, 0) })}`;
+  return [say(`sensor.${sensor.state}`), ...charge(sensor)].join(" · ");
+}
+
+/** How long the battery lasts; of a sensor that does not tell, how full it is. */
+function charge({ battery_low, battery_hours, battery_percent }) {
+  if (battery_low) return []; // said below, with everything else that needs somebody
+  if (battery_hours != null) return [say("battery", { hours: number(battery_hours, 0) })];
+  return battery_percent == null ? [] : [say("battery.percent", { percent: number(battery_percent) })];
 }
 
 function row(sensor) {
