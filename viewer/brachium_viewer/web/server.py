@@ -130,6 +130,7 @@ class _Server:
         finally:
             await runner.cleanup()
             await asyncio.to_thread(self._sessions.close)
+            self._bus.close()  # a question that nobody has answered yet is waited for no longer
 
     def _listen(self) -> list[Inbox]:
         room = self._settings.room
