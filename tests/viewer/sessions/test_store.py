@@ -4,6 +4,7 @@ import os
 import sqlite3
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -118,20 +119,27 @@ def test_a_deletion_leaves_another_recording_whose_name_begins_alike(
         assert {path.name for path in tmp_path.glob("*.mcap")} == {"a.b.mcap"}
 
 
-def test_a_recording_whose_session_nobody_kept_is_found(
-    tmp_path: Path, script: Any, write_session: Any
-) -> None:
+@pytest.fixture
+def kept(tmp_path: Path, script: Any, write_session: Any) -> Iterator[tuple[Store, Any]]:
+    """A store that keeps one session, a.mcap, and who did it."""
     one = script("p01")
     one.set(2, 90.0)
     with Store.open(tmp_path) as store:
         add(tmp_path, store, [one], write_session)
-        write_session(tmp_path / "b.mcap", [one])
-        kept = {session.recording for session in store.sessions()}
+        yield store, one
+
+
+def test_a_recording_whose_session_nobody_kept_is_found(
+    tmp_path: Path, kept: tuple[Store, Any], write_session: Any
+) -> None:
+    store, one = kept
+    write_session(tmp_path / "b.mcap", [one])
+    known = {session.recording for session in store.sessions()}
     message = one.messages[0]
     with recording.RecordingWriter(tmp_path / "c.mcap") as writer:
         writer.write(message[1], message[2], 1)
         writer.tick(10_000_000_000)
-        assert folder.in_no_session(tmp_path, kept) == [tmp_path / "b.mcap"]
+        assert folder.in_no_session(tmp_path, known) == [tmp_path / "b.mcap"]
 
 
 def test_a_store_that_cannot_be_written_is_not_called_none(
@@ -189,14 +197,11 @@ def test_two_processes_use_one_new_folder_at_once(tmp_path: Path) -> None:
 
 
 def test_the_same_recording_measured_again_takes_the_earlier_ones_place(
-    tmp_path: Path, script: Any, write_session: Any
+    tmp_path: Path, kept: tuple[Store, Any]
 ) -> None:
-    one = script("p01")
-    one.set(2, 90.0)
-    with Store.open(tmp_path) as store:
-        add(tmp_path, store, [one], write_session)
-        store.add(session_from_recording(tmp_path / "a.mcap"))
-        assert len(store.sessions("p01")) == 1
+    store, _ = kept
+    store.add(session_from_recording(tmp_path / "a.mcap"))
+    assert len(store.sessions("p01")) == 1
 
 
 @pytest.mark.parametrize("name", ["../x", "Müller", "", "service"])
