@@ -16,6 +16,7 @@ from brachium_fusion.pose import Alignment
 from brachium_fusion.sensor_to_segment import Span
 from brachium_fusion.shoulder_model import NOT_OBSERVABLE_WITHOUT_STERNUM, ArmModel
 from brachium_fusion.shoulder_smoother import smooth_shoulder
+from brachium_fusion.shoulder_trunk import trunk_velocity
 from brachium_fusion.timeline import Shift
 from brachium_fusion.uniform import Uniform
 
@@ -173,8 +174,8 @@ def _trunk_velocity(knowledge: ArmKnowledge, tracked: Mapping[str, Tracked], pos
     if knowledge.trunk is None or sternum is None or not sternum.raw:
         return None
     bias = np.nanmean(sternum.samples.gyr[pose.first : pose.end], axis=0)
-    swing = np.cross(sternum.samples.gyr - bias, knowledge.trunk)
-    return np.nan_to_num(rotation.rotate(sternum.world_from_sensor, swing))
+    rate = sternum.samples.gyr - bias
+    return np.nan_to_num(trunk_velocity(sternum.world_from_sensor, rate, knowledge.trunk))
 
 
 def _untwist(model: ArmModel, tracked: Mapping[str, Tracked], segments: tuple[str, str]) -> None:

@@ -17,6 +17,7 @@ from brachium_fusion.arm_knowledge import ArmKnowledge
 from brachium_fusion.humeral_rotation import HumeralRotation
 from brachium_fusion.joint_filter import JointEstimate, JointFilter
 from brachium_fusion.live_shoulder import LiveShoulder, RestMean
+from brachium_fusion.shoulder_trunk import trunk_velocity
 from brachium_fusion.strap_slip import Slip, SlipWatch
 from brachium_fusion.timeline import SensorNow, Shift
 
@@ -145,7 +146,7 @@ class LiveArm:
         if self._trunk is not None:
             sternum = sensors["sternum"]
             rate = sternum.motion.gyr - self._sternum_bias(rests["sternum"])
-            carried = rotation.rotate(sternum.world_from_sensor, np.cross(rate, self._trunk))
+            carried = trunk_velocity(sternum.world_from_sensor, rate, self._trunk)
         estimate = self._shoulder.step(
             (found[upper], found[forearm]),
             (sensors[upper].motion, sensors[forearm].motion),
