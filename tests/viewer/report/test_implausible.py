@@ -25,3 +25,12 @@ def test_an_elbow_that_bends_beyond_its_range_is_told_with_how_often(impossible)
     told = catalogue("de").told(line)
     assert told.startswith("Ellbogenbeugung, ")
     assert "außerhalb von" in told
+
+
+def test_a_knock_is_not_told_of(worn):
+    found = motions(worn)
+    angle = found["right"].angles_deg["elbow_flexion"]
+    angle[: len(angle) // 150] = 170.0
+    assert implausible(found) == []
+    angle[: len(angle) // 50] = 170.0
+    assert [line.split(":")[0] for line in implausible(found)] == ["elbow flexion, right"]
