@@ -1,11 +1,13 @@
 """What a report says of a calibration and of names, in words with units, in both languages."""
 
 from dataclasses import replace
-from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
+import pytest
+
 from brachium_viewer import figures as f
+from brachium_viewer import marks
 from brachium_viewer.catalogue import catalogue
 from brachium_viewer.contents import Contents, SensorContents
 from brachium_viewer.exercises import exercise
@@ -56,15 +58,47 @@ def test_a_sensor_that_delivered_nothing_has_no_share_lost() -> None:
     assert catalogue("de").told("none") == "keine"
 
 
-def test_one_repetition_is_said_as_one(scripts: Any, tmp_path: Path) -> None:
+def test_what_was_refused_or_left_out_is_told_first() -> None:
+    refused = Calibration(
+        time_ns=1, state="refused", reason="nobody stood still", refused={"elbow_r": "too little"}
+    )
+    report = report_of(refused)
+    report.contents.warning, report.contents.unreadable = "not closed", {"malformed": 2}
+    report.motions, report.groups = {}, [None]
+    assert sentences.warnings(report) == [
+        "not closed",
+        "calibration refused: nobody stood still",
+        "elbow r not found: too little",
+        "left out: 2 messages malformed",
+    ]
+
+
+@pytest.fixture(scope="module")
+def told(scripts: Any, tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
+    """The pages by language of one repetition, after which the patient stopped."""
     one = scripts.Script("p01")
     one.set(1, 90.0)
-    recording = scripts.write(tmp_path / "a.mcap", [one])
-    settings = page.ReportSettings(recording=recording, out=tmp_path / "a.html")
-    page.write(settings)
-    assert "1 active repetition<" in settings.out.read_text("utf-8")
-    page.write(replace(settings, language="de"))
-    assert "1 aktiv (Wiederholung)" in settings.out.read_text("utf-8")
+    one.mark(marks.PatientStop())
+    one.now_s += 2.0
+    one.mark(marks.PatientStop(reason="pain"))
+    folder = tmp_path_factory.mktemp("told")
+    settings = page.ReportSettings(recording=scripts.write(folder / "a.mcap", [one]), out=folder / "a.html")
+    pages = {}
+    for language in ("en", "de"):
+        page.write(replace(settings, language=language))
+        pages[language] = settings.out.read_text("utf-8")
+    return pages
+
+
+def test_one_repetition_is_said_as_one(told: dict[str, str]) -> None:
+    assert "1 active repetition<" in told["en"]
+    assert "1 aktiv (Wiederholung)" in told["de"]
+
+
+def test_a_stop_between_sets_is_told_once_with_its_reason(told: dict[str, str]) -> None:
+    assert told["en"].count("stopped by the patient between sets: pain") == 1
+    assert told["en"].count("stopped by the patient") == 1
+    assert "von der Person zwischen den Sätzen beendet: Schmerz" in told["de"]
 
 
 def test_a_long_pseudonym_breaks() -> None:
