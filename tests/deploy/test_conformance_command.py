@@ -10,8 +10,9 @@ from pathlib import Path
 
 import pytest
 
-NODE = "import os, sys, time; open(sys.argv[1], 'w').write(str(os.getpid())); time.sleep(60)"
 DEADLINE_S = 60.0
+NODE = f"import os, sys, time; open(sys.argv[1], 'w').write(str(os.getpid())); time.sleep({4.0 * DEADLINE_S})"
+"""It runs for longer than is waited for its end."""
 
 
 def until(there: Callable[[], object]) -> bool:

@@ -1,7 +1,9 @@
 """The suite that judges nodes is judged: a right node keeps every rule, one wrong thing breaks one rule."""
 
 import os
+import signal
 import socket
+import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -111,6 +113,25 @@ def test_the_command_s_words_and_variables_say_where_the_gateway_is() -> None:
 def test_a_command_that_is_none_is_said() -> None:
     with pytest.raises(ValueError, match="cannot be started"):
         judge(Trial(command=("no-such-node",), node="n", token="t", patience=QUICK))
+
+
+def test_a_command_that_is_interrupted_as_it_starts_is_ended(monkeypatch: pytest.MonkeyPatch) -> None:
+    begun: list[subprocess.Popen[bytes]] = []
+
+    class Interrupted(subprocess.Popen):  # type: ignore[type-arg]
+        def __init__(self, *words, **more) -> None:
+            super().__init__(*words, **more)
+            begun.append(self)
+            signal.raise_signal(signal.SIGINT)
+
+    monkeypatch.setattr(subprocess, "Popen", Interrupted)
+    words = (sys.executable, "-c", "import time; time.sleep(60)")
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            judge(Trial(command=words, node="n", token="t", patience=QUICK))
+        assert begun[0].poll() is not None
+    finally:
+        begun[0].kill()
 
 
 def test_nothing_is_kept_where_nobody_calls() -> None:

@@ -7,6 +7,7 @@ import signal
 import subprocess
 import time
 from collections.abc import Mapping
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -76,6 +77,11 @@ class Trial:
         """Start the command, after ending what ran before. Raises ValueError when there is none such."""
         self.stop()
         self.starts += 1
+        # A signal cuts short what the main thread does: not between the command's start and its being known.
+        with ThreadPoolExecutor(1) as apart:
+            apart.submit(self._begin).result()
+
+    def _begin(self) -> None:
         environment = {**os.environ, **{VARIABLES[name]: value for name, value in self._named().items()}}
         with (self.log or Path(os.devnull)).open("ab") as said:
             try:
