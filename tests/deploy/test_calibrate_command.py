@@ -13,22 +13,25 @@ from brachium_fusion.service import run as fuse
 from brachium_fusion.settings import Settings
 from brachium_nodes.emulate import EmulateSettings
 from brachium_nodes.emulate import run as emulate
+from brachium_nodes.wearer import WearerSettings
 from brachium_wire import keys
 from brachium_wire.bus import Bus
 
 pytestmark = pytest.mark.network
 
 ROOM = "guided"
+WITHIN_S = 60.0
 
 
 @pytest.fixture
 def network(endpoint: str, tmp_path: Path) -> Iterator[str]:
-    """Run fusion, and an emulated wearer who stands still and then bends the elbow."""
+    """Run fusion, and an emulated wearer who stands still for as long as it takes."""
     stop = threading.Event()
     settings = FuseSettings(
         endpoint=endpoint, room=ROOM, pipeline=Settings(auto_pose=False), keep=tmp_path / "kept"
     )
-    wearer = EmulateSettings(endpoint=endpoint, room=ROOM, subject="p01", direct=True)
+    still = WearerSettings(stand_s=10.0 * WITHIN_S)
+    wearer = EmulateSettings(endpoint=endpoint, room=ROOM, subject="p01", direct=True, wearer=still)
     running = [
         threading.Thread(target=fuse, args=(settings, stop)),
         threading.Thread(target=emulate, args=(wearer, stop)),
@@ -37,11 +40,11 @@ def network(endpoint: str, tmp_path: Path) -> Iterator[str]:
         heard = bus.subscribe(keys.subjects(ROOM, "skeleton/*"))
         for thread in running:
             thread.start()
-        assert heard.wait(20.0)
+        assert heard.wait(WITHIN_S)
     yield endpoint
     stop.set()
     for thread in running:
-        thread.join(10.0)
+        thread.join(WITHIN_S)
 
 
 def test_a_pose_is_asked_for_in_words_and_its_scores_are_told(

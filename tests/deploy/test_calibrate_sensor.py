@@ -25,6 +25,7 @@ from brachium_wire.samples import Samples
 from brachium_wire.sensor_records import SensorProgress
 
 ROOM = "sensors"
+WITHIN_S = 60.0
 SEGMENT = "forearm_r"
 
 
@@ -43,11 +44,11 @@ def network(endpoint: str) -> Iterator[str]:
         heard = bus.subscribe(keys.subjects(ROOM, "skeleton/*"))
         for thread in running:
             thread.start()
-        assert heard.wait(20.0)
+        assert heard.wait(WITHIN_S)
     yield endpoint
     stop.set()
     for thread in running:
-        thread.join(10.0)
+        thread.join(WITHIN_S)
 
 
 def words(endpoint: str, *more: str) -> list[str]:

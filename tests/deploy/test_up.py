@@ -22,7 +22,7 @@ pytestmark = [
     pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="children are found through /proc"),
 ]
 
-LONG_S = 30.0
+LONG_S = 60.0
 
 
 class Up:
