@@ -43,7 +43,6 @@ PROGRAM = {
 }
 PARTS = {
     "Session of",
-    "left out:",
     "{} repeated donnings",  # of lines that are put together: MADE
     "free movement",  # has the pages' line
     "lower left",  # of a drawing
@@ -66,7 +65,6 @@ MADE = {
     *(f"{{}} {when}" for when in get_args(When)),
     "{} (stated)",
     "{} ({} repeated donnings)",
-    "left out: {}",
 }
 """Put together in code."""
 
@@ -153,8 +151,8 @@ def test_another_language_is_refused_with_those_that_are_there():
         ("-3.5 (85 %)", "-3,5 (85 %)"),
         ("/x/a.mcap: not closed: read up to the cut; 2 damaged blocks left out",
          "/x/a.mcap: nicht geschlossen: bis zum Abbruch gelesen; 2 beschädigte Blöcke ausgelassen"),
-        ("left out: 3 messages malformed, 2 messages wrong_type",
-         "ausgelassen: 3 Nachrichten (malformed), 2 Nachrichten (wrong_type)"),
+        ("left out: 3 messages malformed, 1 message wrong_type",
+         "ausgelassen: 3 Nachrichten (malformed), 1 Nachricht (wrong_type)"),
         ("a node that is called to", "a node that is called to"),
     ],
 )  # fmt: skip

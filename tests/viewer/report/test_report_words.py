@@ -63,13 +63,13 @@ def test_what_was_refused_or_left_out_is_told_first() -> None:
         time_ns=1, state="refused", reason="nobody stood still", refused={"elbow_r": "too little"}
     )
     report = report_of(refused)
-    report.contents.warning, report.contents.unreadable = "not closed", {"malformed": 2}
+    report.contents.warning, report.contents.unreadable = "not closed", {"malformed": 2, "wrong_type": 1}
     report.motions, report.groups = {}, [None]
     assert sentences.warnings(report) == [
         "not closed",
         "calibration refused: nobody stood still",
         "elbow r not found: too little",
-        "left out: 2 messages malformed",
+        "left out: 2 messages malformed, 1 message wrong_type",
     ]
 
 

@@ -61,9 +61,9 @@ def warnings(report: Report) -> list[str]:
         found += [f"{what.replace('_', ' ')} not found: {why}" for what, why in calibration.refused.items()]
     found += implausible(report.motions)
     if contents.unreadable:
-        found.append(
-            "left out: " + ", ".join(f"{n} messages {why}" for why, n in contents.unreadable.items())
-        )
+        counts = contents.unreadable.items()
+        told = (f"1 message {why}" if n == 1 else f"{n} messages {why}" for why, n in counts)
+        found.append(f"left out: {', '.join(told)}")
     if not report.groups:
         found.append(
             "No exercise is marked in this recording, so nothing was measured: name it with --exercise and "
