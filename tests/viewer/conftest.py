@@ -219,6 +219,7 @@ def check_lines() -> Callable[[dict[str, str], set[str], set[str], set[str]], No
         keys = {BLANK.sub("{}", key) for key in lines}
         assert sorted({text for text in said if is_sentence(text)} - elsewhere - keys) == []
         assert sorted(keys - said - made) == []
+        assert sorted(elsewhere - said) + sorted(made - keys) == []  # nothing stands aside in vain
         for key, text in lines.items():
             assert set(BLANK.findall(text)) <= set(BLANK.findall(key)), key
             assert text.strip(), key

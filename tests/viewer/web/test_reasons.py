@@ -90,7 +90,3 @@ def test_each_sentence_has_its_line_and_no_line_is_of_what_nobody_says(check_lin
 def test_what_is_left_out_is_there():
     modules = {path.stem for path in FUSION.glob("*.py")}
     assert {name for names in TERMINAL.values() for name in names.split()} <= modules
-
-
-def test_what_is_left_out_is_said(said):
-    assert sorted(ELSEWHERE - said) == []
