@@ -55,7 +55,7 @@ def test_a_session_from_its_first_rating_to_the_store(serve_pages, watch, moving
             assert (await screen.ask("mark", text="here"))["ok"]
             assert (await screen.ask("subject", subject="p02", create=True))["reason"].startswith("a session")
             stopped = await screen.ask("stop")
-            assert stopped["data"]["set"]["seconds"] > seen["set"]["seconds"]
+            assert stopped["data"]["set"]["seconds"] >= seen["set"]["seconds"]
             assert (await screen.ask("patient-stop", reason="tired"))["ok"]
             done = await screen.ask("report")
             assert done["ok"], done
@@ -80,6 +80,16 @@ def test_a_session_from_its_first_rating_to_the_store(serve_pages, watch, moving
         assert [one.measures.exercise for one in kept.sets] == ["elbow-flexion"]
         assert [(one.kind, one.value) for one in kept.ratings] == [("pain", 3)]
         assert store.history("p01", "elbow-flexion", "right") == ()
+
+
+def test_no_mark_is_refused_while_the_recorder_is_there(serve_pages, watch, moving_arm, tmp_path):
+    async def mark(screen):
+        await screen.until(lambda m: m["kind"] == "state" and m["sides"] == ["right"])
+        answers = [await screen.ask("mark") for _ in range(60)]
+        assert [one["reason"] for one in answers if not one["ok"]] == []
+
+    with serve_pages(endpoint=moving_arm, sessions=tmp_path, open_door=True) as serving:
+        watch(serving.address, mark)
 
 
 def test_what_cannot_be_asked_is_refused_in_one_line(serve_pages, watch, moving_arm, tmp_path, caplog):

@@ -81,20 +81,24 @@ def run(settings: WebSettings, stop: threading.Event) -> None:
             f"without a password the pages are for this machine only; {settings.bind} is reached by others: "
             "leave --no-password out"
         )
-    with Bus.open(settings.endpoint, stop=stop) as bus:
-        asyncio.run(_Server(settings, bus).serve(stop))
+    with Bus.open(settings.endpoint, stop=stop) as heard, Bus.open(settings.endpoint, stop=stop) as doing:
+        asyncio.run(_Server(settings, heard, doing).serve(stop))
 
 
 class _Server:
-    """One run of the server; everything here happens on one event loop."""
+    """One run of the server; everything here happens on one event loop.
 
-    def __init__(self, settings: WebSettings, bus: Bus) -> None:
-        self._settings, self._bus = settings, bus
+    What is heard and what is done have a bus each: on the one that watches tokens, a token that is asked for
+    may not be found, and a recorder that is there would be called unreachable.
+    """
+
+    def __init__(self, settings: WebSettings, heard: Bus, doing: Bus) -> None:
+        self._settings, self._bus, self._doing = settings, heard, doing
         self._clock = HostClock()
         self._id = f"web-{os.getpid()}"
         self._state = PageState(settings.room, settings.subject)
         self._sessions = SessionDesk(settings.sessions, settings.endpoint, settings.room, self._id)
-        self._desk = Desk(bus, self._state, self._sessions, self._clock)
+        self._desk = Desk(doing, self._state, self._sessions, self._clock)
         self._seats: set[Seat] = set()
         self._left = 0
         self._state_text = ""
@@ -130,7 +134,7 @@ class _Server:
         finally:
             await runner.cleanup()
             await asyncio.to_thread(self._sessions.close)
-            self._bus.close()  # a question that nobody has answered yet is waited for no longer
+            self._doing.close()  # a question that nobody has answered yet is waited for no longer
 
     def _listen(self) -> list[Inbox]:
         room = self._settings.room
