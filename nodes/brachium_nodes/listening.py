@@ -12,9 +12,9 @@ class BadAddress(ValueError):
 
 
 def listening_address(bind: str) -> str:
-    """Return the address of one interface, or raise BadAddress."""
+    """Return the address of one interface, as which `localhost` counts, too, or raise BadAddress."""
     try:
-        address = ipaddress.ip_address(bind)
+        address = ipaddress.ip_address("127.0.0.1" if bind == "localhost" else bind)
     except ValueError:
         raise BadAddress(f"--bind {bind!r} is no address; write one, as 127.0.0.1") from None
     if address.is_unspecified:

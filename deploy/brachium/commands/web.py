@@ -44,7 +44,7 @@ def run(args: argparse.Namespace) -> int:
     from brachium_viewer.sessions.store import Store
     from brachium_viewer.web import server
 
-    bind = listening_address("127.0.0.1" if args.bind == "localhost" else args.bind)
+    bind = listening_address(args.bind)
     with Store.open(args.sessions) as store:  # refused now, and not when a session is to be kept
         loose = in_no_session(args.sessions, {one.recording for one in store.sessions()})
     if loose:
