@@ -89,16 +89,25 @@ def test_nothing_is_answered_as_kept_while_the_router_is_gone(
         assert [one.ended for one in kept.sets] == ["patient-stop"]
 
 
-def test_a_stop_without_a_router_ends_the_set_and_says_that_it_is_not_written(
+def test_a_stop_without_a_router_ends_the_set_and_is_written_when_it_is_back(
     router, moving_arm, serve_pages, watch, tmp_path
 ):
     async def session(screen):
         await screen.until(lambda m: m["kind"] == "state" and m["sides"] == ["right"])
-        assert (await screen.ask("exercise", **EXERCISE))["ok"]
+        assert (await screen.ask("exercise", repetitions=1, **EXERCISE))["ok"]
+        await screen.until(lambda m: m["kind"] == "frame" and m["set"] and m["set"]["done"])
         router.end()
         await screen.until(lambda m: m["kind"] == "state" and m["recording"]["state"] == "cut")
-        assert "not written" in (await screen.ask("stop"))["reason"]
+        assert "not written yet" in (await screen.ask("stop"))["reason"]
         assert (await screen.ask("stop"))["reason"] == "no set is running"
+        router.begin()
+        while not (await screen.ask("mark"))["ok"]:
+            pass  # the recorder comes back by itself
+        done = await screen.ask("report")
+        assert done["ok"], done
 
     with serve_pages(endpoint=moving_arm, sessions=tmp_path, open_door=True) as serving:
         watch(serving.address, session)
+    with Store.open(tmp_path) as store:
+        (kept,) = store.sessions("p01")
+        assert [one.ended for one in kept.sets] == ["done"]  # without its end it would be "stopped"

@@ -23,7 +23,13 @@ Json = dict[str, Any]
 LONGEST_S = 300.0
 """No calibration takes longer; fusion itself gives up earlier."""
 HEARD_S = 1.0
-STOPPED_UNWRITTEN = "stopped, but that is not written: the router or the recorder cannot be reached"
+BACK_S = 0.5
+"""Between two looks whether the recording can be reached again."""
+OWED_S = 3.0
+"""A report waits so long for the end of a set: two looks, each as long as a look can take."""
+STOPPED_UNWRITTEN = (
+    "stopped, but that is not written yet: it is as soon as the router and the recorder are back"
+)
 
 
 class Refused(ValueError):
@@ -38,6 +44,8 @@ class Desk:
         self._calibrating = False
         self._recording = asyncio.Lock()
         """Held by who begins, marks or ends: nothing is put into a recording that another closes."""
+        self._owed: set[asyncio.Task[None]] = set()
+        """Ends of sets that may not have come to the recording."""
 
     async def do(self, text: str) -> Json:
         """Return the answer to one message of a page."""
@@ -159,9 +167,22 @@ class Desk:
                 return {}
             raise Refused("no set is running")
         done = running.progress().done and reason == "stopped"
-        self._put(subject, marks.ExerciseEnds(reason="done" if done else reason), self._instant_ns())
+        mark, now_ns = marks.ExerciseEnds(reason="done" if done else reason), self._instant_ns()
+        self._put(subject, mark, now_ns)
         ended = self._state.end()
+        task = asyncio.create_task(self._put_again(subject, mark, now_ns))
+        self._owed.add(task)
+        task.add_done_callback(self._owed.discard)
         return {"set": ended}
+
+    async def _put_again(self, subject: str, mark: marks.Mark, now_ns: int) -> None:
+        """Put what was put while nothing was recorded, once it is again; whoever asked may be gone."""
+        lost = False
+        while not await self._sessions.reached(self._bus):
+            lost = True
+            await asyncio.sleep(BACK_S)
+        if lost:
+            self._put(subject, mark, now_ns)
 
     async def _patient_stop(self, subject: str, asked: r.PatientStop) -> Json:
         ended = await self._end(subject, "patient-stop", none_is_fine=True)
@@ -177,6 +198,8 @@ class Desk:
         async with self._recording:
             if self._state.running is not None:
                 await self._end(subject, "stopped")
+            if self._owed:
+                await asyncio.wait(self._owed, timeout=OWED_S)
             await asyncio.sleep(HEARD_S)  # what was said last is still on its way to the recording
             closed = await self._sessions.end()
         return await self._sessions.keep(closed, subject, language)
