@@ -22,8 +22,6 @@ def load(scope: Scope) -> ModuleType:
     try:
         import pylsl
         from pylsl import util
-    except ModuleNotFoundError:
-        raise
     except (RuntimeError, OSError) as error:
         why = next(iter(str(error).strip().splitlines()), "it cannot be loaded")
         raise NoLsl(
