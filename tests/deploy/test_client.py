@@ -168,7 +168,7 @@ def test_a_program_that_fails_in_its_loop_still_ends(router_endpoint: str):
     loop = f"for key, s in brachium.skeletons(endpoint={router_endpoint!r}):\n    raise OSError('mine')"
     command = [sys.executable, "-c", f"import brachium\n{loop}"]
     with repeating(router_endpoint, keys.skeleton("lab", "p01", "right"), skeleton):
-        done = subprocess.run(command, capture_output=True, text=True, timeout=30, check=False)
+        done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
     assert done.returncode == 1
     assert "OSError: mine" in done.stderr
 
@@ -180,7 +180,7 @@ def test_the_example_prints_elbows_and_ends_with_ctrl_c(router_endpoint: str):
         assert example.stdout is not None
         lines = [example.stdout.readline() for _ in range(5)]
         example.send_signal(signal.SIGINT)
-        example.communicate(timeout=30)
+        example.communicate(timeout=60)
     assert lines == ["p01 right elbow   28.6 deg\n"] * 5
 
 
@@ -200,6 +200,6 @@ def test_ctrl_c_while_no_router_answers_shows_nothing_of_the_transport():
     assert process.stderr is not None
     assert "waiting for the router" in process.stderr.readline()
     process.send_signal(signal.SIGINT)
-    said = process.communicate(timeout=30)[1]
+    said = process.communicate(timeout=60)[1]
     assert "KeyboardInterrupt" in said
     assert "ZError" not in said
