@@ -1,5 +1,7 @@
 """A page whose server is gone shows no number of an arm, and does not claim to record."""
 
+import threading
+
 import pytest
 
 sync_api = pytest.importorskip("playwright.sync_api")
@@ -25,3 +27,27 @@ def test_a_page_that_is_cut_off_shows_no_number(browser, moving_arm, serve_pages
     expect(page.locator("#count-value")).not_to_have_text("–")  # what was counted stays
     expect(patient.locator("body")).not_to_contain_text("Move calmly", timeout=PATIENCE_MS)
     context.close()
+
+
+def test_a_line_that_is_dead_and_not_closed_is_noticed_and_made_anew(
+    browser, moving_arm, serve_pages, tmp_path
+):
+    page = browser.new_page(locale="en-GB")
+    lines = []
+
+    def between(line) -> None:
+        lines.append(dead := threading.Event())
+        server = line.connect_to_server()
+        server.on_message(lambda message: None if dead.is_set() else line.send(message))
+
+    page.route_web_socket("**/ws", between)
+    with serve_pages(endpoint=moving_arm, sessions=tmp_path, open_door=True) as serving:
+        page.goto(serving.address)
+        angle, headline = (sync_api.expect(page.locator(name)) for name in ("#angle-value", "#headline"))
+        angle.to_contain_text("°", timeout=PATIENCE_MS)
+        lines[0].set()
+        angle.to_have_text("–", timeout=PATIENCE_MS)
+        angle.to_contain_text("°", timeout=PATIENCE_MS)
+        headline.to_contain_text("of 1 sensors", timeout=PATIENCE_MS)
+        page.close()
+    assert len(lines) == 2

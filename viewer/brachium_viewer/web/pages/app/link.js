@@ -5,6 +5,8 @@ import { language } from "./words.js";
 const FIRST_PAUSE_MS = 300;
 const LONGEST_PAUSE_MS = 5000;
 const ANSWER_MS = 320000;
+const LOOK_MS = 1000;
+const SILENT_LOOKS = 8; // the server tells at once that an arm is silent: who hears nothing for so long has a dead line
 
 /** What a frame still tells when the line is cut: who and how many, but of no arm where it is now. */
 function silent(frame) {
@@ -22,7 +24,9 @@ export class Link {
     this.newest = null;
     this.number = 0;
     this.pause = FIRST_PAUSE_MS;
+    this.silent = 0;
     this.open();
+    setInterval(() => this.look(), LOOK_MS);
   }
 
   open() {
@@ -36,7 +40,17 @@ export class Link {
     this.socket.onclose = () => this.lost();
   }
 
+  /** A network that is gone closes nothing: count looks, not time, for a page that was busy has not heard yet. */
+  look() {
+    const shown = Object.values(this.newest?.arms ?? {}).some((arm) => !arm.stale);
+    if (this.socket.readyState !== WebSocket.OPEN || !shown || ++this.silent < SILENT_LOOKS) return;
+    this.socket.onclose = this.socket.onmessage = null;
+    this.socket.close();
+    this.lost();
+  }
+
   take(message) {
+    this.silent = 0;
     if (message.kind === "answer") {
       this.waiting.get(message.id)?.(message);
       this.waiting.delete(message.id);
@@ -48,13 +62,15 @@ export class Link {
 
   async lost() {
     this.heard.line?.(false);
-    if (this.newest) this.heard.frame?.(silent(this.newest));
+    this.newest &&= silent(this.newest);
+    if (this.newest) this.heard.frame?.(this.newest);
     for (const answer of this.waiting.values()) answer({ ok: false, reason: "" });
     this.waiting.clear();
     await new Promise((done) => setTimeout(done, this.pause));
     this.pause = Math.min(LONGEST_PAUSE_MS, 2 * this.pause);
     // A key that has run out is told by no WebSocket: ask for something small, and go to the door if it is refused.
-    const asked = await fetch("/app/link.js", { method: "HEAD", cache: "no-store" }).catch(() => null);
+    const signal = AbortSignal.timeout(LONGEST_PAUSE_MS);
+    const asked = await fetch("/app/link.js", { method: "HEAD", cache: "no-store", signal }).catch(() => null);
     if (asked?.status === 401) location.assign(`/door?to=${location.pathname}`);
     else this.open();
   }
