@@ -13,7 +13,7 @@ from brachium_viewer.contents import Contents, SensorContents
 from brachium_viewer.exercises import exercise
 from brachium_viewer.report import page, sentences, words
 from brachium_viewer.report import report_tables as tables
-from brachium_wire.messages import Calibration, Info
+from brachium_wire.messages import Calibration, Info, Session
 from brachium_wire.sequence import SequenceCounter
 
 
@@ -56,6 +56,21 @@ def test_a_sensor_that_delivered_nothing_has_no_share_lost() -> None:
         ["hand r", tables.NONE, "60", "40.00", "0", tables.NONE],
     ]
     assert catalogue("de").told("none") == "keine"
+
+
+def test_how_far_estimated_lengths_put_places_off_is_told() -> None:
+    def method(**said: Any) -> str:
+        report = report_of(Calibration(time_ns=1, state="done"))
+        report.contents.sessions, report.contents.fusion = {"p01": Session(**said)}, {}
+        report.session.method = 1
+        return sentences.method(report)[-1]
+
+    of_height = method(height_m=1.8)
+    assert "be off by 2.0, 2.4 and 2.6 cm" in of_height
+    assert "um 2,0, 2,4 und 2,6 cm falsch" in catalogue("de").told(of_height)
+    assert "not told" in method()
+    measured = {"chest_to_shoulder": 0.2, "upper_arm": 0.3, "forearm": 0.25, "hand": 0.18}
+    assert "AAOS reference" in method(lengths_m=measured)
 
 
 def test_what_was_refused_or_left_out_is_told_first() -> None:

@@ -146,10 +146,9 @@ def longest_gaps(report: Report) -> dict[str, float]:
     """Return by arm the longest time without a skeleton while one of its sets ran, s."""
     found: dict[str, float] = {}
     for one in report.session.sets:
-        side: Side = "left" if one.measures.side == "left" else "right"
-        motion, zero = report.motions[side], report.zero_ns
-        from_s, to_s = (one.from_ns - zero) / 1e9, (one.to_ns - zero) / 1e9
-        inside = motion.between(from_s, to_s).time_s
-        gaps = np.diff(np.concatenate([[from_s], inside, [to_s]]))
+        side = one.measures.side
+        time_ns = report.contents.arms[report.session.subject, side].published.time_ns
+        inside = time_ns[(time_ns >= one.from_ns) & (time_ns < one.to_ns)]
+        gaps = np.diff(np.concatenate([[one.from_ns], inside, [one.to_ns]])) / 1e9
         found[side] = max(found.get(side, 0.0), float(gaps.max()))
     return found

@@ -6,7 +6,7 @@ from datetime import UTC, datetime
 from brachium_viewer.figures import SegmentFigures
 from brachium_viewer.metrics.both_arms import Components
 from brachium_viewer.metrics.measure import Measure
-from brachium_viewer.metrics.set_measures import FEW, values
+from brachium_viewer.metrics.set_measures import FEW, SHOULDER, SHOULDER_OR_TRUNK, values
 from brachium_viewer.page_sections import PageTable
 from brachium_viewer.report import words
 from brachium_viewer.report.groups import Group, Past, Symmetry
@@ -78,7 +78,7 @@ def _limits(group: Group) -> list[str]:
 
 def measures(groups: Sequence[Group]) -> PageTable:
     """Return the medians of the repetitions: a row a measure, a column a group."""
-    word = "shoulder" if groups[0].pooled.shoulder_word == "shoulder" else "shoulder or trunk movement"
+    word = min((g.pooled.shoulder_word for g in groups), key=[SHOULDER_OR_TRUNK, SHOULDER].index)
     head = ["median of the repetitions", "unit"]
     head += [words.movement(g.exercise.name, g.side, "" if g.mode == "active" else g.mode) for g in groups]
     rows = []
@@ -97,8 +97,8 @@ def measures(groups: Sequence[Group]) -> PageTable:
 
 
 def _coverage(group: Group) -> str:
-    found = [r.measures["range"].coverage for r in group.pooled.repetitions]
-    return f"{100.0 * sum(found) / len(found):.0f}" if found else NONE
+    share = group.pooled.measured
+    return NONE if share is None else f"{100.0 * share:.0f}"
 
 
 def within_session(groups: Sequence[Group]) -> PageTable | None:

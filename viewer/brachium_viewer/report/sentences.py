@@ -2,6 +2,7 @@
 
 from importlib import metadata
 
+from brachium_body.lengths import from_measured
 from brachium_viewer.exercises import PLANES_DEG
 from brachium_viewer.metrics.smoothness import CUTOFF_HZ, LDLJ_RATE_HZ
 from brachium_viewer.report import report_tables as tables
@@ -9,6 +10,7 @@ from brachium_viewer.report import words
 from brachium_viewer.report.build import Report
 from brachium_viewer.report.implausible import implausible
 from brachium_viewer.sessions.from_recording import readable, stops_between_sets
+from brachium_wire.messages import Session
 
 
 def facts(report: Report) -> list[str]:
@@ -98,6 +100,23 @@ def method(report: Report) -> list[str]:
         f"angles are {words.SHOULDER}.",
         "Ranges are from the resting start to the farthest point held for 0.2 s. AAOS reference: ranges of "
         "healthy adults in general, not what is to be expected of one person.",
+        *_lengths(report.contents.sessions.get(report.session.subject) or Session()),
+    ]
+
+
+def _lengths(said: Session) -> list[str]:
+    """Return how far places may be off because the arm's lengths are estimates; nothing where all were
+    measured."""
+    try:
+        lengths = from_measured(said.lengths_m, said.height_m)
+    except ValueError:
+        return ["How long the arm is was not told: places and paths are those of an arm of usual length."]
+    if not lengths.relative_sd:
+        return []
+    _, elbow, wrist, hand = 100.0 * lengths.position_sd()
+    return [
+        "Lengths of the arm are estimated from height: by them alone the places of elbow, wrist and hand may "
+        f"be off by {elbow:.1f}, {wrist:.1f} and {hand:.1f} cm (standard deviation)."
     ]
 
 
