@@ -137,6 +137,16 @@ def test_a_server_ends_while_a_calibration_is_waited_for(serve_pages, watch, mov
         assert len(held) == 1
 
 
+def test_a_patients_stop_arrives_while_nobody_is_chosen(serve_pages, watch, router_endpoint, tmp_path):
+    async def stop(screen):
+        assert (await screen.ask("patient-stop", reason="dizzy"))["ok"]
+        state = await screen.until(lambda m: m["kind"] == "state" and m["stopped"] == "dizzy")
+        assert state["subject"] is None
+
+    with serve_pages(endpoint=router_endpoint, sessions=tmp_path, open_door=True) as serving:
+        watch(serving.address, stop)
+
+
 def test_a_new_subject_is_told_to_the_room(serve_pages, watch, moving_arm, tmp_path):
     async def create(screen):
         await screen.until(lambda m: m["kind"] == "state" and m["subject"] == "p01")

@@ -69,6 +69,8 @@ class Desk:
         if isinstance(asked, r.Subject):
             return self._subject(asked)
         subject = self._state.subject
+        if isinstance(asked, r.PatientStop):
+            return await self._patient_stop(subject, asked)
         if subject is None:
             raise Refused("nobody is chosen: choose a subject first")
         match asked:
@@ -87,8 +89,6 @@ class Desk:
                 if not await self._sessions.reached(self._bus):
                     raise Refused(STOPPED_UNWRITTEN)
                 return ended
-            case r.PatientStop():
-                return await self._patient_stop(subject, asked)
             case r.Report():
                 return await self._finish(subject, asked.language)
             case r.Mark():
@@ -184,9 +184,11 @@ class Desk:
         if lost:
             self._put(subject, mark, now_ns)
 
-    async def _patient_stop(self, subject: str, asked: r.PatientStop) -> Json:
-        ended = await self._end(subject, "patient-stop", none_is_fine=True)
+    async def _patient_stop(self, subject: str | None, asked: r.PatientStop) -> Json:
         self._state.stopped = asked.reason  # every screen is told, whatever becomes of the recording
+        if subject is None:
+            return {}  # nothing runs, and nothing is recorded
+        ended = await self._end(subject, "patient-stop", none_is_fine=True)
         try:
             with suppress(NoRecording):  # it shows an alarm of its own
                 await self._mark(subject, marks.PatientStop(reason=asked.reason))
