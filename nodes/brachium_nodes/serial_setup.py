@@ -62,7 +62,7 @@ def read_configuration(path: Path) -> dict[str, Any]:
     rules = import_module("brachium_nodes.firmware.configuration")  # MicroPython: it has no types
     try:
         rules.checked(said)
-    except (ValueError, TypeError) as error:
+    except ValueError as error:
         raise NotTold(f"the node would refuse {path}: {error}") from None
     return said
 

@@ -204,6 +204,8 @@ GOOD = {"id": "n1", "token": "t"}
         ({**GOOD, "i2c": {"sdl": 1}}, "'i2c.sdl' is not known"),
         ({**GOOD, "i2c": 1}, "must be an object"),
         ({**GOOD, "gateway": 1}, "cannot be 1"),
+        ({**GOOD, "rate_hz": None}, "'rate_hz' cannot be None"),
+        ({**GOOD, "batch": [5]}, "'batch' cannot be [5]"),
         ({**GOOD, "rate_hz": 1000}, "rate_hz takes"),
         ({**GOOD, "poll_ms": 400}, "between two polls"),
         ([], "one JSON object"),

@@ -119,7 +119,7 @@ def _merged(defaults, said, where):
             if not isinstance(value, dict):
                 raise ValueError("%s: %r must be an object" % (FILE, name))
             value = _merged(usual, value, name + ".")
-        elif isinstance(usual, str) != isinstance(value, str):
+        elif not isinstance(value, str if isinstance(usual, str) else (int, float, bool)):
             raise ValueError("%s: %r cannot be %r" % (FILE, where + name, value))
         chosen[name] = value
     return chosen
