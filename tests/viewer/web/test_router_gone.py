@@ -46,14 +46,31 @@ def router_endpoint(router):
     return endpoint(router.settings)
 
 
-def test_nothing_is_answered_as_kept_while_the_router_is_gone(
-    router, moving_arm, serve_pages, watch, tmp_path
-):
+@pytest.fixture
+def how_sets_ended(moving_arm, serve_pages, watch, tmp_path):
+    """What the store says of a session that a screen does, and ends with its report."""
+
+    def found(does) -> list[str]:
+        async def session(screen):
+            await screen.until(lambda m: m["kind"] == "state" and m["sides"] == ["right"])
+            await does(screen)
+            done = await screen.ask("report")
+            assert done["ok"], done
+
+        with serve_pages(endpoint=moving_arm, sessions=tmp_path, open_door=True) as serving:
+            watch(serving.address, session)
+        with Store.open(tmp_path) as store:
+            (kept,) = store.sessions("p01")
+            return [one.ended for one in kept.sets]
+
+    return found
+
+
+def test_nothing_is_answered_as_kept_while_the_router_is_gone(router, how_sets_ended):
     async def session(screen):
         def recording_is(how):
             return lambda m: m["kind"] == "state" and m["recording"]["state"] == how
 
-        await screen.until(lambda m: m["kind"] == "state" and m["sides"] == ["right"])
         assert (await screen.ask("exercise", **EXERCISE))["ok"]
         await screen.until(recording_is("on"))
         router.end()
@@ -79,21 +96,12 @@ def test_nothing_is_answered_as_kept_while_the_router_is_gone(
         assert (await screen.until(recording_is("on")))["alarms"] == []
         while not (await screen.ask("patient-stop", reason="pain"))["ok"]:
             pass  # the recorder comes back by itself, maybe a little later than the pages
-        done = await screen.ask("report")
-        assert done["ok"], done
 
-    with serve_pages(endpoint=moving_arm, sessions=tmp_path, open_door=True) as serving:
-        watch(serving.address, session)
-    with Store.open(tmp_path) as store:
-        (kept,) = store.sessions("p01")
-        assert [one.ended for one in kept.sets] == ["patient-stop"]
+    assert how_sets_ended(session) == ["patient-stop"]
 
 
-def test_a_stop_without_a_router_ends_the_set_and_is_written_when_it_is_back(
-    router, moving_arm, serve_pages, watch, tmp_path
-):
+def test_a_stop_without_a_router_ends_the_set_and_is_written_when_it_is_back(router, how_sets_ended):
     async def session(screen):
-        await screen.until(lambda m: m["kind"] == "state" and m["sides"] == ["right"])
         assert (await screen.ask("exercise", repetitions=1, **EXERCISE))["ok"]
         await screen.until(lambda m: m["kind"] == "frame" and m["set"] and m["set"]["done"])
         router.end()
@@ -103,11 +111,5 @@ def test_a_stop_without_a_router_ends_the_set_and_is_written_when_it_is_back(
         router.begin()
         while not (await screen.ask("mark"))["ok"]:
             pass  # the recorder comes back by itself
-        done = await screen.ask("report")
-        assert done["ok"], done
 
-    with serve_pages(endpoint=moving_arm, sessions=tmp_path, open_door=True) as serving:
-        watch(serving.address, session)
-    with Store.open(tmp_path) as store:
-        (kept,) = store.sessions("p01")
-        assert [one.ended for one in kept.sets] == ["done"]  # without its end it would be "stopped"
+    assert how_sets_ended(session) == ["done"]  # without its end it would be "stopped"
