@@ -134,6 +134,19 @@ def test_calibration_and_session_are_shown_as_they_were_told():
     assert shown["session"] == {"side": "left", "height_m": 1.7, "lengths_m": {}}
 
 
+@pytest.mark.parametrize(("state", "left"), [("waiting", None), ("running", None), ("done", "done")])
+def test_a_calibration_that_goes_on_ends_with_fusion(state, left):
+    pages = PageState("lab", "p01")
+    pages.feed(keys.calibration("lab", "p01"), encode(Calibration(time_ns=1, state=state)), S)
+    pages.token(keys.services("lab", "gateway/g/alive"), False)
+    assert pages.state(S)["calibration"]["state"] == state
+    pages.token(keys.services("lab", "fusion/f/alive"), True)
+    assert pages.state(S)["calibration"]["state"] == state
+    pages.token(keys.services("lab", "fusion/f/alive"), False)
+    shown = pages.state(S)["calibration"]
+    assert (shown and shown["state"]) == left
+
+
 def test_what_cannot_be_read_is_counted_and_harms_nothing(fed):
     state = PageState("lab")
     state.feed("not/ours", b"x", S)

@@ -78,6 +78,15 @@ class PageState:
         elif isinstance(message, Session):
             subject.session = message
 
+    def token(self, key: str, alive: bool) -> None:
+        """Take a service that came or went; a calibration that was going on ends with its fusion."""
+        self.network.token(key, alive)
+        if alive or not key.startswith(keys.services(self.room, "fusion/")):
+            return
+        for one in self._subjects.values():
+            if one.calibration is not None and one.calibration.state in ("waiting", "running"):
+                one.calibration = None
+
     def choose(self, subject: str) -> None:
         """Show this subject. Raises BadKey for a name that cannot be one, ValueError while a set runs."""
         keys.subject_chunk(subject)

@@ -184,7 +184,7 @@ class _Server:
             for key, payload in inbox.drain():
                 self._state.feed(key, payload, now_ns)
         while self._tokens:
-            self._state.network.token(*self._tokens.pop(0))
+            self._state.token(*self._tokens.pop(0))
 
     def _tell(self) -> None:
         """Give every screen what is new: the frame now, the state at most five times a second."""
