@@ -37,7 +37,7 @@ def build(
         quality=quality,
         positions_m=places,
         shoulder_shift_m=np.full((n, 3), np.nan) if shift is None else shift,
-        with_sternum=with_sternum,
+        sternum=np.full(n, with_sternum),
     )
 
 

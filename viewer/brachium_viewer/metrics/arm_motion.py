@@ -1,12 +1,14 @@
 """One arm's motion as arrays: what every measure takes. Pure."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from brachium_body.angles import COLUMNS
 from brachium_body.segments import Side
+from brachium_viewer.metrics.holes import NOTHING, Rows, with_holes
 from brachium_wire.messages import Origin, Quality, Skeleton
 from brachium_wire.skeleton_columns import SkeletonColumns
 
@@ -21,7 +23,10 @@ JOINTS = ("shoulder", "elbow", "wrist", "hand")
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ArmMotion:
-    """An arm at n instants in growing order. What is not known is NaN, what is not measured is so marked."""
+    """An arm at n instants in growing order. What is not known is NaN, what is not measured is so marked.
+
+    Rows are evenly spaced as far as they can be: where no skeleton came, there are rows that are `missing`.
+    """
 
     side: Side
     origin: Origin
@@ -34,9 +39,15 @@ class ArmMotion:
     positions_m: dict[str, Floats]
     """By JOINTS: (n, 3) in trunk axes."""
     shoulder_shift_m: Floats
-    """(n, 3) in trunk axes from the pose."""
-    with_sternum: bool
-    """Whether the trunk is measured: without it a shoulder's movement may be the trunk's."""
+    """(n, 3) in trunk axes from the pose; NaN where it is not measured, as while it fades in or out."""
+    sternum: Mask
+    """(n,) where a sensor on the sternum measures the trunk: elsewhere a shoulder's movement may be the
+    trunk's."""
+
+    @property
+    def with_sternum(self) -> bool:
+        """Return whether the trunk is measured at some instant."""
+        return bool(self.sternum.any())
 
     def measured(self, name: str) -> Mask:
         """Return where (n,) an angle or joint is measured: neither held nor assumed nor uncalibrated."""
@@ -61,31 +72,43 @@ class ArmMotion:
             quality={name: words[rows] for name, words in self.quality.items()},
             positions_m={name: places[rows] for name, places in self.positions_m.items()},
             shoulder_shift_m=self.shoulder_shift_m[rows],
-            with_sternum=self.with_sternum,
+            sternum=self.sternum[rows],
         )
 
 
 def arm_motion(skeletons: SkeletonColumns, zero_ns: int = 0) -> ArmMotion:
     """Return the motion of one arm's skeletons; times count from `zero_ns`.
 
+    A time without skeletons that is too long to be bridged becomes rows in which all is `missing` (holes).
     Raises ValueError when there are none.
     """
     if not len(skeletons):
         raise ValueError("there are no skeletons of this arm; record while fusion runs")
-    angles = dict(zip(COLUMNS, np.degrees(skeletons.angles_rad(COLUMNS)).T.copy(), strict=True))
+    time_s, rows = with_holes((skeletons.time_ns - zero_ns) / 1e9)
+    angles = dict(zip(COLUMNS, np.degrees(skeletons.angles_rad(COLUMNS)).T, strict=True))
     places = {joint: skeletons.positions_m(joint) for joint in JOINTS}
     known = {name: np.isfinite(values) for name, values in angles.items()}
     known |= {joint: np.isfinite(place).all(axis=1) for joint, place in places.items()}
+    quality = {name: np.where(there, _words(skeletons, name), "missing") for name, there in known.items()}
+    there = np.isin(_words(skeletons, "shoulder"), list(MEASURED))
+    shift = np.where(there[:, None], skeletons.shoulder_shift_m(), np.nan)
     return ArmMotion(
         side=skeletons.last.side,
         origin=skeletons.last.origin,
-        time_s=(skeletons.time_ns - zero_ns) / 1e9,
-        angles_deg=angles,
-        quality={name: np.where(there, _words(skeletons, name), "missing") for name, there in known.items()},
-        positions_m=places,
-        shoulder_shift_m=skeletons.shoulder_shift_m(),
-        with_sternum=bool(skeletons.each(_with_sternum).any()),
+        time_s=time_s,
+        angles_deg={name: _at(values, rows, np.nan) for name, values in angles.items()},
+        quality={name: _at(words, rows, "missing") for name, words in quality.items()},
+        positions_m={name: _at(place, rows, np.nan) for name, place in places.items()},
+        shoulder_shift_m=_at(shift, rows, np.nan),
+        sternum=_at(skeletons.each(_with_sternum, np.bool_), rows, False),
     )
+
+
+def _at(values: npt.NDArray[Any], rows: Rows, nothing: object) -> npt.NDArray[Any]:
+    """Return the values of rows (m,), and what stands for none where there is NOTHING."""
+    found: npt.NDArray[Any] = values[rows]
+    found[rows == NOTHING] = nothing
+    return found
 
 
 def _words(skeletons: SkeletonColumns, name: str) -> npt.NDArray[np.str_]:
@@ -93,4 +116,4 @@ def _words(skeletons: SkeletonColumns, name: str) -> npt.NDArray[np.str_]:
 
 
 def _with_sternum(skeleton: Skeleton) -> bool:
-    return "sternum" in skeleton.segments and skeleton.segments["sternum"].quality != "missing"
+    return "sternum" in skeleton.segments and skeleton.segments["sternum"].quality in MEASURED

@@ -8,14 +8,18 @@ import numpy as np
 from brachium_viewer.exercises import Exercise
 from brachium_viewer.metrics import kinematics
 from brachium_viewer.metrics.arm_motion import ArmMotion
+from brachium_viewer.metrics.holes import unseen
 from brachium_viewer.metrics.measure import ENOUGH, Measure, measure, why_not, withheld
 from brachium_viewer.metrics.repetition_measures import (
+    ABOUT_S,
     NAMES,
     RepetitionMeasures,
     count,
     repetition_measures,
 )
+from brachium_viewer.metrics.repetitions import Repetition
 
+SHOULDER, SHOULDER_OR_TRUNK = "shoulder", "shoulder or trunk movement"
 FEW = 5
 """First against last so many repetitions."""
 
@@ -32,7 +36,7 @@ class SetMeasures:
     from_s: float
     to_s: float
     tries: int
-    """Movements that went less than half the way: not repetitions."""
+    """Movements that went less than half the way, and were seen whole: not repetitions."""
     repetitions: tuple[RepetitionMeasures, ...]
     medians: dict[str, Measure]
     """Of the repetitions, by NAMES."""
@@ -44,6 +48,8 @@ class SetMeasures:
     """By how much the elbow stayed short of straight, deg; 0 when it went straight."""
     shoulder_word: str
     """What a shift of the shoulder may be: `shoulder` alone, or `shoulder or trunk movement`."""
+    measured: float | None = None
+    """Part of the set's time in which its angle was measured; None of a set measured before this was told."""
 
 
 def set_measures(
@@ -55,7 +61,8 @@ def set_measures(
 ) -> SetMeasures:
     """Return the measures of a set; the motion is of the set alone."""
     done = count(motion, exercise)
-    found = tuple(repetition_measures(motion, exercise, one, goal_deg) for one in done.repetitions)
+    holes = unseen(motion.time_s, motion.measured(exercise.angle))
+    found = tuple(_seen(motion, exercise, one, goal_deg, holes) for one in done.repetitions)
     none = _why_none(motion, exercise)
     return SetMeasures(
         exercise=exercise.name,
@@ -64,14 +71,56 @@ def set_measures(
         goal_deg=goal_deg,
         from_s=float(motion.time_s[0]) if len(motion.time_s) else 0.0,
         to_s=float(motion.time_s[-1]) if len(motion.time_s) else 0.0,
-        tries=len(done.tries),
+        tries=sum(_hole_of(one, holes) is None for one in done.tries),
         repetitions=found,
         medians={name: _median(found, name, none) for name in NAMES},
         best_peak=_best(found, rises=exercise.rises, none=none),
         first_to_last={name: _change(found, name) for name in NAMES},
         extension_deficit=_deficit(motion),
-        shoulder_word="shoulder" if motion.with_sternum else "shoulder or trunk movement",
+        shoulder_word=_shoulder_word(motion, found),
+        measured=float(motion.measured(exercise.angle).mean()) if len(motion.time_s) else 0.0,
     )
+
+
+def _seen(
+    motion: ArmMotion,
+    exercise: Exercise,
+    repetition: Repetition,
+    goal_deg: float | None,
+    holes: Sequence[tuple[float, float]],
+) -> RepetitionMeasures:
+    """Return the measures of one repetition; none when a hole is in it or beside its base.
+
+    What was done meanwhile may have been its farthest point, or the end of it and the begin of another.
+    """
+    made = repetition_measures(motion, exercise, repetition, goal_deg)
+    hole = _hole_of(repetition, holes)
+    if hole is None:
+        return made
+    from_s, to_s = hole
+    why = why_not(motion.between(from_s, to_s).quality[exercise.angle])
+    said = f"not measured for {to_s - from_s:.1f} s of it: {why}"
+    return replace(
+        made, measures={name: withheld(said, one.unit, one.coverage) for name, one in made.measures.items()}
+    )
+
+
+def _hole_of(repetition: Repetition, holes: Sequence[tuple[float, float]]) -> tuple[float, float] | None:
+    """Return the longest hole in a repetition or beside its base; None when there is none."""
+    base = repetition.base_s
+    spans = ((repetition.from_s, repetition.to_s), (base - ABOUT_S, base + ABOUT_S))
+    found = [hole for hole in holes if any(hole[0] <= to and hole[1] >= begin for begin, to in spans)]
+    return max(found, key=lambda hole: hole[1] - hole[0], default=None)
+
+
+def _shoulder_word(motion: ArmMotion, found: Sequence[RepetitionMeasures]) -> str:
+    """Return what the shift may be: the shoulder's alone where the trunk is measured beside it."""
+    shifted = np.isfinite(motion.shoulder_shift_m).all(axis=1)
+    t = motion.time_s
+    spans = [(t >= one.from_s) & (t <= one.to_s) & shifted for one in found]
+    used = [motion.sternum[rows] for rows in spans if rows.any()] or [motion.sternum]
+    enough = all(len(rows) and float(rows.mean()) >= ENOUGH for rows in used)
+    return SHOULDER if enough else SHOULDER_OR_TRUNK
 
 
 def together(sets: Sequence[SetMeasures], exercise: Exercise) -> SetMeasures:
@@ -93,7 +142,17 @@ def together(sets: Sequence[SetMeasures], exercise: Exercise) -> SetMeasures:
         best_peak=_best(found, rises=exercise.rises, none=none),
         first_to_last={name: _change(found, name) for name in NAMES},
         extension_deficit=min(deficits, key=lambda one: one.value or 0.0, default=sets[0].extension_deficit),
+        shoulder_word=min((one.shoulder_word for one in sets), key=[SHOULDER_OR_TRUNK, SHOULDER].index),
+        measured=_measured(sets),
     )
+
+
+def _measured(sets: Sequence[SetMeasures]) -> float | None:
+    known = [(one.measured, one.to_s - one.from_s) for one in sets if one.measured is not None]
+    seconds = sum(length for _, length in known)
+    if len(known) < len(sets) or not seconds:
+        return None
+    return sum(share * length for share, length in known) / seconds
 
 
 def values(found: tuple[RepetitionMeasures, ...], name: str) -> list[float]:
