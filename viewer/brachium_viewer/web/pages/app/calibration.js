@@ -4,6 +4,7 @@ import { $, busy, make, renew, tell } from "./page.js";
 import { has, say, told } from "./words.js";
 
 const RUNNING = new Set(["waiting", "running"]);
+const MOVES_ON = new Set(["running", "done"]);
 
 const WEAR_STEPS = ["listen", "ready", "hang", "raise", "bend"];
 
@@ -69,6 +70,7 @@ export class Calibration {
   }
 
   show(news) {
+    if (MOVES_ON.has(news?.state) && news.state !== this.news?.state) this.refused = ""; // asked for anew, maybe elsewhere
     this.news = news;
     const step = this.step(news);
     const runs = step !== null;
