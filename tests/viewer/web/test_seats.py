@@ -12,7 +12,7 @@ def test_a_slow_screen_gets_the_newest_frame_and_state_and_all_its_answers():
         seat.put_answer("first")
         seat.put_answer("second")
         taken = await seat.take()
-        assert (seat.skipped, seat.sent) == (99, 4)
+        assert seat.skipped == 99
         return taken
 
     assert asyncio.run(run()) == ["first", "second", "state 99", "frame 99"]

@@ -18,7 +18,6 @@ class Seat:
         self._state: str | None = None
         self._frame: str | None = None
         self._something = asyncio.Event()
-        self.sent = 0
         self.skipped = 0
 
     def put_frame(self, text: str) -> None:
@@ -44,5 +43,4 @@ class Seat:
         out = [*self._answers, *(text for text in (self._state, self._frame) if text is not None)]
         self._answers.clear()
         self._state = self._frame = None
-        self.sent += len(out)
         return out

@@ -105,13 +105,10 @@ export function number(value, digits = 0) {
   return value.toLocaleString(language, { minimumFractionDigits: digits, maximumFractionDigits: digits });
 }
 
-/** Fill in every element below `root` that names its words: data-say, data-say-label, data-say-title. */
+/** Fill in every element below `root` that names its words: data-say, data-say-label. */
 export function fill(root) {
   for (const element of root.querySelectorAll("[data-say]")) element.textContent = say(element.dataset.say);
   for (const element of root.querySelectorAll("[data-say-label]")) {
     element.setAttribute("aria-label", say(element.dataset.sayLabel));
-  }
-  for (const element of root.querySelectorAll("[data-say-hint]")) {
-    element.setAttribute("placeholder", say(element.dataset.sayHint));
   }
 }
