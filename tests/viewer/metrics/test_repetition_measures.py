@@ -131,7 +131,7 @@ def test_the_hands_way(motion_of) -> None:
         for h in (straight, round_way)
     ]
     assert found[0].medians["straightness"].value == pytest.approx(1.0, abs=0.01)
-    assert found[0].medians["hand_path"].value == pytest.approx(0.27, abs=0.02)
+    assert found[0].medians["hand_path"].value == pytest.approx(0.3, abs=0.005)
     assert found[1].medians["straightness"].value < 0.75
     assert found[1].medians["hand_path"].value > 0.35
 

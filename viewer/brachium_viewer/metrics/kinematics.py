@@ -7,7 +7,9 @@ adds nothing to a range.
 import numpy as np
 import numpy.typing as npt
 
+from brachium_viewer.metrics.bridge import rounded
 from brachium_viewer.metrics.even_grid import even, smooth, stretches
+from brachium_viewer.metrics.smoothness import LDLJ_RATE_HZ, at_ldlj_rate
 
 Floats = npt.NDArray[np.float64]
 
@@ -15,6 +17,8 @@ RATE_HZ = 50.0
 HOLD_S = 0.2
 SPEED_CUTOFF_HZ = 6.0
 """Above it there is no voluntary movement, and differentiating makes noise larger."""
+AROUND_S = 1.0
+"""So much before and after a movement is filtered with it."""
 HELD_SHARE = 0.1
 """Held: within this part of the movement's range of its farthest point."""
 
@@ -38,13 +42,32 @@ def extremes(time_s: Floats, values: Floats) -> tuple[float, float]:
     return (float(known.min()), float(known.max())) if len(known) else (np.nan, np.nan)
 
 
-def angular_speed(time_s: Floats, values: Floats) -> tuple[Floats, Floats]:
-    """Return an even grid (m,) s and the derivative of values (n,) or (n, k) per second."""
-    grid, found = even(time_s, values, RATE_HZ)
-    if len(grid) < 2:
-        return grid, np.full_like(found, np.nan)
-    smoothed = smooth(found, RATE_HZ, SPEED_CUTOFF_HZ)
-    return grid, np.asarray(np.gradient(smoothed, 1.0 / RATE_HZ, axis=0), dtype=np.float64)
+def angular_velocity(time_s: Floats, values: Floats, from_s: float, to_s: float) -> Floats:
+    """Return the derivative of values (n,) per second at LDLJ_RATE_HZ, from `from_s` to `to_s`.
+
+    What is known within AROUND_S of them is used, so that a filter does not begin where a movement does.
+    Empty when the values are not known throughout.
+    """
+    near = (time_s >= from_s - AROUND_S) & (time_s <= to_s + AROUND_S)
+    grid, found = even(*rounded(time_s[near], values[near], RATE_HZ), RATE_HZ)
+    inside = (
+        (first, end)
+        for first, end in stretches(np.isfinite(found))
+        if grid[first] <= from_s + 1.0 / RATE_HZ and grid[end - 1] >= to_s - 1.0 / RATE_HZ and end - first > 4
+    )
+    for first, end in inside:
+        smoothed = smooth(found[first:end], RATE_HZ, SPEED_CUTOFF_HZ)
+        velocity = at_ldlj_rate(np.gradient(smoothed, 1.0 / RATE_HZ), RATE_HZ)
+        begin, last = (round((s - float(grid[first])) * LDLJ_RATE_HZ) for s in (from_s, to_s))
+        return velocity[max(begin, 0) : last + 1]
+    return np.empty(0)
+
+
+def longest_gap_s(time_s: Floats, known: npt.ArrayLike, from_s: float, to_s: float) -> float:
+    """Return the longest time between `from_s` and `to_s` in which no known row (n,) lies."""
+    seen = time_s[np.asarray(known, dtype=np.bool_)]
+    inside = seen[(seen > from_s) & (seen < to_s)]
+    return float(np.diff(np.concatenate([[from_s], inside, [to_s]])).max())
 
 
 def path(time_s: Floats, places: Floats) -> tuple[float, float]:
@@ -72,7 +95,7 @@ def hold_s(time_s: Floats, values: Floats) -> float:
 
 
 def reached_s(time_s: Floats, values: Floats, goal: float) -> float:
-    """Return how long after its begin a rising movement (n,) reached `goal`; NaN when it did not."""
+    """Return when a rising movement (n,) reached `goal`, s; NaN when it did not."""
     grid, mean = held_mean(time_s, values)
     at = np.flatnonzero(mean >= goal)
-    return float(grid[at[0]] - time_s[0]) if len(at) else float("nan")
+    return float(grid[at[0]]) if len(at) else float("nan")

@@ -10,7 +10,8 @@ from brachium_viewer.metrics import kinematics
 from brachium_viewer.metrics.arm_motion import ArmMotion, Floats
 from brachium_viewer.metrics.measure import ENOUGH, Measure, measure, why_not, withheld
 from brachium_viewer.metrics.repetitions import FLOOR_DEG, MovementSet, Repetition, movement_set
-from brachium_viewer.metrics.smoothness import LDLJ_RATE_HZ, at_ldlj_rate, ldlj, sparc
+from brachium_viewer.metrics.smoothness import LDLJ_RATE_HZ, ldlj, sparc
+from brachium_viewer.metrics.way_there import Way, way_there
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -41,11 +42,18 @@ NAMES: dict[str, str] = {
 }
 """Every measure of a repetition, with its unit. `start`: where the angle was before it went; `peak`: how far
 it went; `shoulder_shift`: the farthest that the shoulder moved (or shoulder and trunk, without a sternum
-sensor); smoothness is of the way there, which ends at the peak."""
-
+sensor). Of the way there (`way_there`), be it up or down: `movement_time`; `mean_speed`, what the angle went
+over that time, so that a tremor on the way adds nothing; `peak_speed`, a tremor's too; `time_to_goal`, from
+its begin; smoothness; `hand_path` and `straightness`."""
 
 ABOUT_S = 0.5
 """About the instant of its base an arm rests."""
+AROUND_S = 2.0
+"""So much before and after a repetition is looked at for where its way there begins and ends."""
+SMOOTH_GAP_S = 0.1
+"""A longer gap in the way there may hide a jerk. So long a one makes LDLJ of a smooth reach wrong by up to
+0.15, and one of 0.3 s by 0.6."""
+NO_WAY = "the way there has a gap or is too short"
 
 
 def rising(motion: ArmMotion, exercise: Exercise) -> Floats:
@@ -64,13 +72,15 @@ def repetition_measures(
 ) -> RepetitionMeasures:
     """Return the measures of one repetition; what cannot be trusted is withheld with its reason."""
     part = motion.between(repetition.from_s, repetition.to_s + 1e-6)
-    there = motion.between(repetition.from_s, repetition.peak_s + 1e-6)
     base = motion.between(repetition.base_s - ABOUT_S, repetition.base_s + ABOUT_S)
+    around = motion.between(repetition.low_s - AROUND_S, repetition.to_s + AROUND_S)
+    way = way_there(around.time_s, rising(around, exercise), repetition)
     found = {
-        **_of_the_angle(part, base, exercise, goal_deg),
-        **_of_the_way(there, exercise),
-        **_of_places(part, there),
+        **_of_the_angle(part, base, exercise),
+        **_of_the_way(around, way, exercise),
+        **_of_places(part, around.between(*(way[:2] if way else (0.0, 0.0)))),
     }
+    found["time_to_goal"] = _time_to_goal(part, way, exercise, goal_deg, found["range"])
     return RepetitionMeasures(
         from_s=repetition.from_s,
         to_s=repetition.to_s,
@@ -79,9 +89,7 @@ def repetition_measures(
     )
 
 
-def _of_the_angle(
-    part: ArmMotion, base: ArmMotion, exercise: Exercise, goal_deg: float | None
-) -> dict[str, Measure]:
+def _of_the_angle(part: ArmMotion, base: ArmMotion, exercise: Exercise) -> dict[str, Measure]:
     sign = 1.0 if exercise.rises else -1.0
     angle = rising(part, exercise)
     coverage = _coverage(np.isfinite(angle))
@@ -90,21 +98,15 @@ def _of_the_angle(
     reason = _off_plane(part, exercise) or (
         why_not(part.quality[exercise.angle]) if coverage < ENOUGH else ""
     )
-    goal = np.nan if goal_deg is None else kinematics.reached_s(part.time_s, angle, sign * goal_deg)
     numbers = {
         "start": sign * low,
         "peak": sign * high,
         "range": high - low,
-        "movement_time": float(part.time_s[-1] - part.time_s[0]) if len(part.time_s) else np.nan,
         "hold_time": kinematics.hold_s(part.time_s, angle),
-        "time_to_goal": goal,
     }
     found = {name: measure(value, NAMES[name], coverage) for name, value in numbers.items()}
-    if goal_deg is None or np.isnan(goal):
-        why = "no goal was set" if goal_deg is None else "the goal was not reached"
-        found["time_to_goal"] = withheld(why, "s", coverage)
     if reason:
-        for name in ("start", "peak", "range", "time_to_goal"):
+        for name in ("start", "peak", "range"):
             found[name] = withheld(reason, NAMES[name], coverage)
     return found
 
@@ -128,24 +130,44 @@ def _off_plane(part: ArmMotion, exercise: Exercise) -> str:
     return f"went in plane {middle:.0f} deg, not in {exercise.plane} ({low:.0f} to {top:.0f})"
 
 
-def _of_the_way(there: ArmMotion, exercise: Exercise) -> dict[str, Measure]:
-    angle = rising(there, exercise)
-    coverage = _coverage(np.isfinite(angle))
-    grid, velocity = kinematics.angular_speed(there.time_s, angle)
-    names = ("peak_speed", "mean_speed", "sparc", "ldlj")
-    if len(grid) < 8 or not np.isfinite(velocity).all():
-        return {
-            name: withheld("the way there has a gap or is too short", NAMES[name], coverage) for name in names
-        }
-    speed = np.abs(velocity)
-    rate = kinematics.RATE_HZ
+def _of_the_way(around: ArmMotion, way: Way | None, exercise: Exercise) -> dict[str, Measure]:
+    names = ("movement_time", "mean_speed", "peak_speed", "sparc", "ldlj")
+    angle, times = rising(around, exercise), around.time_s
+    velocity = np.empty(0) if way is None else kinematics.angular_velocity(times, angle, way.from_s, way.to_s)
+    if way is None or not len(velocity):
+        return {name: withheld(NO_WAY, NAMES[name]) for name in names}
+    known = np.isfinite(angle)
+    coverage = _coverage(known[(times >= way.from_s) & (times <= way.to_s)])
+    seconds, speed = way.to_s - way.from_s, np.abs(velocity)
     numbers = (
-        float(speed.max()),
-        float(speed.mean()),
-        sparc(speed, rate),
-        ldlj(at_ldlj_rate(speed, rate), LDLJ_RATE_HZ),
+        seconds,
+        way.went / seconds,
+        speed.max(),
+        sparc(speed, LDLJ_RATE_HZ),
+        ldlj(velocity, LDLJ_RATE_HZ),
     )
-    return {name: measure(value, NAMES[name], coverage) for name, value in zip(names, numbers, strict=True)}
+    found = {name: measure(float(x), NAMES[name], coverage) for name, x in zip(names, numbers, strict=True)}
+    gap = kinematics.longest_gap_s(times, known, way.from_s, way.to_s)
+    if gap > SMOOTH_GAP_S + 1e-3:
+        why = f"a gap of {gap:.2f} s in the way there may hide a jerk"
+        found |= {name: withheld(why, "1", coverage) for name in ("sparc", "ldlj")}
+    return found
+
+
+def _time_to_goal(
+    part: ArmMotion, way: Way | None, exercise: Exercise, goal_deg: float | None, of_range: Measure
+) -> Measure:
+    if of_range.value is None:
+        return withheld(of_range.withheld, "s", of_range.coverage)
+    if goal_deg is None:
+        return withheld("no goal was set", "s", of_range.coverage)
+    if way is None:
+        return withheld(NO_WAY, "s", of_range.coverage)
+    sign = 1.0 if exercise.rises else -1.0
+    at_s = kinematics.reached_s(part.time_s, rising(part, exercise), sign * goal_deg)
+    if np.isnan(at_s):
+        return withheld("the goal was not reached", "s", of_range.coverage)
+    return measure(max(at_s - way.from_s, 0.0), "s", of_range.coverage)
 
 
 def _of_places(part: ArmMotion, there: ArmMotion) -> dict[str, Measure]:

@@ -38,6 +38,10 @@ class Repetition(NamedTuple):
     base_s: float
     """When it was at its base: the higher of the lows before and after. A first repetition may come up from
     a hanging arm, and a last one end in it; neither is how far the exercise went."""
+    base: float
+    """The value at its base, low-passed."""
+    low_s: float
+    """When it was lowest before it rose."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -130,7 +134,14 @@ def _repetition(t: Floats, v: Floats, swing: _Swing) -> Repetition:
     after = np.flatnonzero(v[swing.peak : swing.end + 1] <= level)
     first = swing.low + int(before[-1]) if len(before) else swing.low
     last = swing.peak + int(after[0]) if len(after) else swing.end
-    return Repetition(float(t[first]), float(t[last]), float(t[swing.peak]), float(t[base]))
+    return Repetition(
+        from_s=float(t[first]),
+        to_s=float(t[last]),
+        peak_s=float(t[swing.peak]),
+        base_s=float(t[base]),
+        base=float(v[base]),
+        low_s=float(t[swing.low]),
+    )
 
 
 def _within(instant: float, span: Repetition) -> bool:

@@ -73,6 +73,6 @@ def _numbers(repetition: RepetitionMeasures) -> dict[str, Any]:
         "to": repetition.to_s,
         "peak_at": repetition.peak_s,
         **{name: np.nan if one.value is None else one.value for name, one in found.items()},
-        "coverage": found["movement_time"].coverage,
+        "coverage": found["range"].coverage,
         "withheld": "; ".join(reasons),
     }
