@@ -4,6 +4,9 @@ import logging
 from contextlib import suppress
 from pathlib import Path
 
+import msgspec
+import numpy as np
+
 from brachium.shell import Usage
 from brachium_fusion import from_recording, solve
 from brachium_fusion.result import tabulate
@@ -13,6 +16,7 @@ from brachium_wire import keys, recording, table
 from brachium_wire.codec import WireError, decode_topic
 from brachium_wire.messages import Event, Skeleton
 from brachium_wire.recording import Recorded
+from brachium_wire.steady_times import steady_times
 from brachium_wire.table import Table
 
 _log = logging.getLogger(__name__)
@@ -59,7 +63,7 @@ def _live(source: Path, subject: str | None) -> Table | None:
         raise Usage(f"{source}: holds subjects {', '.join(moving)}; choose one with --subject")
     name = subject or next(iter(moving))
     contents = moving[name]
-    skeletons = contents.live
+    skeletons = _on_one_clock(contents)
     chosen = from_recording.settings_of(contents)
     times_ns = sorted({s.time_ns for s in skeletons})
     made = tabulate(skeletons, times_ns, [1e-9 * (t - times_ns[0]) for t in times_ns])
@@ -81,6 +85,24 @@ def _live(source: Path, subject: str | None) -> Table | None:
             "settings": settings,
         },
     )
+
+
+def _on_one_clock(contents: from_recording.Contents) -> list[Skeleton]:
+    """Return the live skeletons at times that grow; what was put right or left out is warned of."""
+    arrived = np.array(contents.live_arrived_ns, dtype=np.int64)
+    times = np.array([s.time_ns for s in contents.live], dtype=np.int64)
+    of_side = [rows for side in SIDES if (rows := np.array([s.side == side for s in contents.live])).any()]
+    steady = steady_times([(times[rows], arrived[rows]) for rows in of_side])
+    if not steady.told:
+        return contents.live
+    _log.warning("%s", steady.told)
+    kept = np.zeros(len(times), dtype=np.bool_)
+    for rows, time_ns, known in zip(of_side, steady.time_ns, steady.kept, strict=True):
+        times[rows], kept[rows] = time_ns, known
+    return [
+        msgspec.structs.replace(contents.live[i], time_ns=int(times[i]))
+        for i in np.flatnonzero(kept).tolist()
+    ]
 
 
 def events_of(arrived: list[Recorded], subject: str, zero_ns: int) -> list[dict[str, object]]:

@@ -44,6 +44,8 @@ class Contents:
     """What fusion said of itself, where there is no snapshot."""
     live: list[Skeleton] = field(default_factory=list)
     """The skeletons that were published."""
+    live_arrived_ns: list[int] = field(default_factory=list)
+    """When each was recorded."""
     foreign_snapshot: bool = False
     """Found while solving: the snapshot is of another version of fusion."""
 
@@ -51,19 +53,20 @@ class Contents:
 def sort_out(messages: Iterable[Recorded]) -> dict[str, Contents]:
     """Return what a recording holds, by subject. What cannot be read is left aside: it was so live, too."""
     subjects: dict[str, Contents] = {}
-    for key, payload, _ in messages:
+    for key, payload, arrived_ns in messages:
         try:
             parsed = keys.parse(key)
             if parsed.topic in ("imu", "info"):
                 subjects.setdefault(parsed.subject, Contents()).samples.append((parsed, payload))
             elif parsed.topic in ("event", "snapshot", "skeleton"):
-                _sort_message(subjects.setdefault(parsed.subject, Contents()), parsed.topic, payload)
+                contents = subjects.setdefault(parsed.subject, Contents())
+                _sort_message(contents, parsed.topic, payload, arrived_ns)
         except (keys.BadKey, WireError, TypeError):
             continue
     return subjects
 
 
-def _sort_message(contents: Contents, topic: str, payload: bytes) -> None:
+def _sort_message(contents: Contents, topic: str, payload: bytes, arrived_ns: int) -> None:
     message = decode_topic(payload, topic)
     if isinstance(message, Event) and message.kind == "applied":
         contents.changes.append(Change(message.time_ns, message.text, message.data))
@@ -73,6 +76,7 @@ def _sort_message(contents: Contents, topic: str, payload: bytes) -> None:
         contents.snapshot = message
     elif isinstance(message, Skeleton):
         contents.live.append(message)
+        contents.live_arrived_ns.append(arrived_ns)
 
 
 def settings_of(contents: Contents) -> Settings:

@@ -1,7 +1,7 @@
 """What a recording holds, sorted out into arrays: the way in of figures, pages and exports."""
 
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +24,7 @@ from brachium_wire.messages import (
 from brachium_wire.recording import Recorded
 from brachium_wire.sequence import SequenceCounter
 from brachium_wire.skeleton_columns import SkeletonCollector, SkeletonColumns
+from brachium_wire.steady_times import steady_times
 
 Who = tuple[str, str]
 """A subject and a segment or side."""
@@ -42,7 +43,10 @@ class SensorContents:
 
 @dataclass(frozen=True, slots=True)
 class ArmContents:
-    """One arm's skeletons, published and true, in the order in which they came; there is at least one."""
+    """One arm's skeletons, published and true, in the order in which they came; there is at least one.
+
+    The times of those that were published grow.
+    """
 
     published: SkeletonColumns
     true: SkeletonColumns
@@ -66,6 +70,8 @@ class Contents:
     """Fusion's settings for each subject."""
     unreadable: dict[str, int] = field(default_factory=dict)
     """Messages left out, by reason."""
+    clocks: dict[str, str] = field(default_factory=dict)
+    """Of each subject whose skeletons' times did not grow: what was put right, and what was left out."""
 
     @property
     def duration_s(self) -> float:
@@ -115,7 +121,19 @@ def sort_out(messages: Iterable[Recorded]) -> Contents:
         for collector in collectors.values():
             for reason, n in collector.refused.items():
                 _count(contents, reason, n)
+    _put_right(contents)
     return contents
+
+
+def _put_right(contents: Contents) -> None:
+    """Put the skeletons of each subject on one clock; the true ones have their own, which nobody sets."""
+    for subject in {who for who, _ in contents.arms}:
+        arms = {who: arm for who, arm in contents.arms.items() if who[0] == subject}
+        steady = steady_times([(arm.published.time_ns, arm.published.arrived_ns) for arm in arms.values()])
+        if steady.told:
+            contents.clocks[subject] = steady.told
+        for (who, arm), time_ns, kept in zip(arms.items(), steady.time_ns, steady.kept, strict=True):
+            contents.arms[who] = replace(arm, published=arm.published.on_clock(time_ns, kept))
 
 
 def _count(contents: Contents, reason: str, n: int = 1) -> None:

@@ -5,6 +5,7 @@ What is taken and what is refused, and why, is what `decode` takes and refuses: 
 
 from collections import Counter
 from collections.abc import Callable, Iterable
+from copy import copy
 from dataclasses import dataclass
 from typing import Any
 
@@ -64,6 +65,21 @@ class SkeletonColumns:
 
     def __len__(self) -> int:
         return len(self.form)
+
+    def on_clock(self, time_ns: Integers, kept: npt.NDArray[np.bool_]) -> "SkeletonColumns":
+        """Return some of them at times put right: both (n,) as SteadyTimes holds them."""
+        if kept.all() and (time_ns == self.time_ns).all():
+            return self
+        row = np.cumsum(kept) - 1
+        found = copy(self)
+        found.form, found.time_ns = self.form[kept], time_ns[kept]
+        found.received_ns, found.arrived_ns = self.received_ns[kept], self.arrived_ns[kept]
+        found._parts = [
+            _Part(row[part.rows[there]], part.columns, part.floats[there])
+            for part in self._parts
+            if (there := kept[part.rows]).any()
+        ]
+        return found
 
     @property
     def last(self) -> Skeleton:

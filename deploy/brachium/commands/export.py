@@ -9,11 +9,13 @@ import argparse
 import os
 from pathlib import Path
 
-from brachium.option_types import LONGEST_S, real
+from brachium.option_types import real
 from brachium.output_file import spare
 from brachium.shell import Usage, add_json, print_json
 
 FORMATS = ("csv", "parquet", "sto", "mot", "trc", "c3d", "bvh", "rrd", "motion-bids")
+LATEST_S = 1e10
+"""Recordings may hold parts years apart, by clocks that were set."""
 WHERE = {
     "sto": "OpenSim (OpenSense): orientations of torso, humerus, radius, hand",
     "mot": "OpenSim: joint angles",
@@ -44,11 +46,11 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--from",
         dest="from_s",
-        type=real(0.0, LONGEST_S),
+        type=real(0.0, LATEST_S),
         metavar="S",
         help="from the motion's first instant",
     )
-    parser.add_argument("--until", dest="until_s", type=real(0.0, LONGEST_S), metavar="S", help="likewise")
+    parser.add_argument("--until", dest="until_s", type=real(0.0, LATEST_S), metavar="S", help="likewise")
     parser.add_argument(
         "--measured", action="store_true", help="leave out what is held, assumed or uncalibrated"
     )

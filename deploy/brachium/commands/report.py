@@ -63,6 +63,8 @@ def run(args: argparse.Namespace) -> int:
     )
     if not found.sets and begins is None:
         _log.warning("%s: %s", args.recording, NOTHING)
+    if found.clock:
+        _log.warning("%s: %s", args.recording, found.clock)
     if args.json:
         print_json(found)
         return 0

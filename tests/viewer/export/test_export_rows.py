@@ -57,6 +57,21 @@ def test_nothing_is_put_into_a_gap():
         assert (again.columns["quality_forearm_r"][inside] == "").all()
 
 
+def test_what_is_nearly_all_gap_is_refused_with_where_to_cut_it():
+    part = np.arange(100) / 50.0
+    table = moving(np.concatenate([part, part + 86_400.0]))
+    with pytest.raises(TableError, match=r"from 1\.98 s to 86400\.00 s.*--until 1\.99.*--from 86399\.99"):
+        rows.evenly(table, 50.0)
+    for cut in (rows.between(table, None, 1.99), rows.between(table, 86_399.99, None)):
+        assert len(rows.evenly(cut, 50.0)) == 100
+    assert len(rows.evenly(moving(np.concatenate([part, part + 300.0])), 50.0)) == 50 * 302
+
+
+def test_times_that_do_not_grow_are_refused():
+    with pytest.raises(TableError, match=r"time does not grow after 1\.00 s"):
+        rows.evenly(moving(np.concatenate([np.arange(51), np.arange(40, 80)]) / 50.0), 50.0)
+
+
 def test_a_number_beside_an_unknown_one_stays_and_nothing_comes_between():
     table = moving(np.arange(20) / 10.0)
     table.columns["elbow_flexion"][5] = np.nan

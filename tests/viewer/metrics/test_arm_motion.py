@@ -62,3 +62,8 @@ def test_a_part_is_the_same_arm_for_a_while() -> None:
 def test_none_is_refused() -> None:
     with pytest.raises(ValueError, match="no skeletons"):
         arm_motion(columns([]))
+
+
+def test_times_that_do_not_grow_are_refused() -> None:
+    with pytest.raises(ValueError, match="do not grow"):
+        arm_motion(columns([skeleton(0), skeleton(2), skeleton(1)]))

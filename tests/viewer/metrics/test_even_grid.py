@@ -22,6 +22,21 @@ def test_a_short_gap_is_bridged_and_a_long_one_stays() -> None:
     assert np.allclose(found[known], 3.0 * grid[known])
 
 
+def test_a_gap_of_a_year_takes_no_room_and_changes_nothing_beside_it() -> None:
+    part = np.arange(0.0, 10.0, 0.02)
+    starts = (0.0, 700.0, 3.15e7)
+    time = np.concatenate([part + at for at in starts])
+    grid, found = even(time, np.sin(time), 50.0)
+    assert len(grid) <= len(time) + 2 * len(starts)
+    assert (np.diff(grid) > 0.0).all()
+    assert [end - first for first, end in stretches(np.isfinite(found))] == [500, 500, 500]
+    for at in starts:
+        here = (grid > at - 0.01) & (grid < at + 9.99)
+        alone, values = even(part + at, np.sin(part + at), 50.0)
+        np.testing.assert_allclose(grid[here], alone, atol=1e-6)
+        np.testing.assert_allclose(found[here], values, atol=1e-6)
+
+
 @given(seed=st.integers(0, 100), columns=st.integers(1, 3))
 def test_rows_of_several_columns_are_as_each_by_itself(seed: int, columns: int) -> None:
     random = np.random.default_rng(seed)

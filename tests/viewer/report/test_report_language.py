@@ -23,7 +23,7 @@ SOURCES = [
     *(VIEWER / "metrics" / f"{name}.py" for name in ("measure", "repetition_measures", "set_measures")),
     VIEWER / "metrics" / "both_arms.py",
     VIEWER / "page_template.py",
-    Path(brachium_wire.__file__).parent / "reading.py",
+    *(Path(brachium_wire.__file__).parent / f"{name}.py" for name in ("reading", "steady_times")),
 ]
 OTHERS = c.LANGUAGES[1:]
 BLANK = re.compile(r"\{[^{}]*\}")

@@ -80,10 +80,12 @@ def test_what_was_refused_or_left_out_is_told_first() -> None:
     report = report_of(refused)
     report.contents.warning, report.contents.unreadable = "not closed", {"malformed": 2, "wrong_type": 1}
     report.motions, report.groups = {}, [None]
+    report.contents.clocks = {"p01": "the clock jumped"}
     assert sentences.warnings(report) == [
         "not closed",
         "calibration refused: nobody stood still",
         "elbow r not found: too little",
+        "the clock jumped",
         "left out: 2 messages malformed, 1 message wrong_type",
     ]
 

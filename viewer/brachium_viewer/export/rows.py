@@ -18,6 +18,9 @@ Floats = npt.NDArray[np.float64]
 PARTS = ("w", "x", "y", "z")
 GAP_PERIODS = 1.5
 """Two instants further apart than so many periods have a gap between them: nothing is put there."""
+EMPTY_FROM, EMPTY_TIMES = 100_000, 10
+"""An even grid with so many instants is refused when it has so many times those of the table, too: what is
+nearly all gap is no motion, but recordings of two days or a clock that was set."""
 SAME = 1e-4
 """Of a period: an instant nearer to one that is there than this is that one."""
 
@@ -163,10 +166,12 @@ def evenly(table: Table, rate_hz: float) -> Table:
     """Return the table at first + k / rate_hz, k = 0, 1, ...: numbers on the line between their neighbours.
 
     Where neighbours are further apart than GAP_PERIODS, or one of them is not known, nothing is known.
-    Orientations turn the shortest way; words are those of the neighbour before.
+    Orientations turn the shortest way; words are those of the neighbour before. Raises TableError for times
+    that do not grow, and for a table that is nearly all gap.
     """
     time_s = np.asarray(table.columns["time"], dtype=np.float64)
     period = period_s(time_s)
+    _refuse(time_s, period)
     count = int(np.floor((time_s[-1] - time_s[0]) * rate_hz + SAME)) + 1
     wanted = time_s[0] + np.arange(count) / rate_hz
     before = np.clip(np.searchsorted(time_s, wanted + SAME * period, side="right") - 1, 0, len(time_s) - 1)
@@ -193,6 +198,23 @@ def evenly(table: Table, rate_hz: float) -> Table:
         turned[gap] = np.nan
         columns |= {f"{stem}_q{part}": turned[:, i] for i, part in enumerate(PARTS)}
     return Table(columns, table.units, table.metadata)
+
+
+def _refuse(time_s: Floats, period: float) -> None:
+    """Refuse times (n,) that no even grid is for."""
+    step = np.diff(time_s)
+    if not (step > 0.0).all():
+        at = time_s[np.argmax(step <= 0.0)] - time_s[0]
+        raise TableError(f"time does not grow after {at:.2f} s: sort its rows, or cut it there with --until")
+    instants = (time_s[-1] - time_s[0]) / period
+    if instants > EMPTY_FROM and instants > EMPTY_TIMES * len(time_s):
+        longest = int(np.argmax(step))
+        last, first = (float(time_s[i] - time_s[0]) for i in (longest, longest + 1))
+        raise TableError(
+            f"nothing is known from {last:.2f} s to {first:.2f} s, and an even grid over it would be empty: "
+            f"export what is before with --until {last + 0.5 * period:.2f}, what is after with "
+            f"--from {first - 0.5 * period:.2f}"
+        )
 
 
 def _line(a: Floats, b: Floats, fraction: Floats) -> Floats:

@@ -80,10 +80,12 @@ def arm_motion(skeletons: SkeletonColumns, zero_ns: int = 0) -> ArmMotion:
     """Return the motion of one arm's skeletons; times count from `zero_ns`.
 
     A time without skeletons that is too long to be bridged becomes rows in which all is `missing` (holes).
-    Raises ValueError when there are none.
+    Raises ValueError when there are none, or their times do not grow.
     """
     if not len(skeletons):
         raise ValueError("there are no skeletons of this arm; record while fusion runs")
+    if (np.diff(skeletons.time_ns) <= 0).any():
+        raise ValueError("these skeletons' times do not grow; put them on one clock first: steady_times")
     time_s, rows = with_holes((skeletons.time_ns - zero_ns) / 1e9)
     angles = dict(zip(COLUMNS, np.degrees(skeletons.angles_rad(COLUMNS)).T, strict=True))
     places = {joint: skeletons.positions_m(joint) for joint in JOINTS}

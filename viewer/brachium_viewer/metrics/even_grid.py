@@ -14,25 +14,39 @@ Floats = npt.NDArray[np.float64]
 
 BRIDGED_S = 0.5
 """A longer gap stays one. No arm turns round unseen within it by more than a tremor."""
+LONGEST_S = 600.0
+"""A grid over a gap of a day would be a day long and hold nothing."""
 
 
 def even(time_s: Floats, values: Floats, rate_hz: float) -> tuple[Floats, Floats]:
     """Return the grid (m,) s from the first to the last known value, and the values (m,) or (m, k) on it.
 
     `values` (n,) or (n, k) at growing times (n,); a row with NaN is not known. Between known rows at most
-    BRIDGED_S apart it is interpolated, elsewhere NaN. Nothing known: empty arrays.
+    BRIDGED_S apart it is interpolated, elsewhere NaN; a gap longer than LONGEST_S has one instant. Nothing
+    known: empty arrays.
     """
     table = values[:, None] if values.ndim == 1 else values
     known = np.isfinite(table).all(axis=1)
     t, v = time_s[known], table[known]
     if len(t) == 0:
         return np.empty(0), np.empty((0, *values.shape[1:]))
-    grid = np.arange(t[0], t[-1] + 1e-9, 1.0 / rate_hz)
+    grid = _grid(t, rate_hz)
     out = np.stack([np.interp(grid, t, column) for column in v.T], axis=1)
     after = np.clip(np.searchsorted(t, grid, side="left"), 0, len(t) - 1)
     before = np.clip(np.searchsorted(t, grid, side="right") - 1, 0, len(t) - 1)
     out[t[after] - t[before] > BRIDGED_S] = np.nan
     return grid, out[:, 0] if values.ndim == 1 else out
+
+
+def _grid(t: Floats, rate_hz: float) -> Floats:
+    begins = np.flatnonzero(np.diff(t) > LONGEST_S) + 1
+    if not len(begins):
+        return np.arange(t[0], t[-1] + 1e-9, 1.0 / rate_hz)
+    parts = np.split(t - t[0], begins)
+    counts = [
+        np.arange(np.ceil(p[0] * rate_hz - 1e-9), np.floor(p[-1] * rate_hz + 1e-9) + 2.0) for p in parts
+    ]
+    return np.asarray(t[0] + np.concatenate(counts)[:-1] / rate_hz)
 
 
 def smooth(values: Floats, rate_hz: float, cutoff_hz: float) -> Floats:

@@ -61,6 +61,8 @@ class ReportFigures:
     """Of their measures, those beyond the smallest detectable change."""
     bytes: int
     """Of the page."""
+    clock: str
+    """What was wrong with the times in the recording; empty when nothing was."""
 
 
 def write(settings: ReportSettings) -> ReportFigures:
@@ -99,6 +101,7 @@ def write(settings: ReportSettings) -> ReportFigures:
         compared=sum(bool(past.changes) for past in report.pasts if past is not None),
         changed=sum(change.detected for change in changes),
         bytes=len(text.encode()),
+        clock=contents.clocks.get(who, ""),
     )
 
 

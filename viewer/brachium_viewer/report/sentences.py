@@ -61,6 +61,7 @@ def warnings(report: Report) -> list[str]:
         if calibration.state == "refused":
             found.append(f"calibration refused: {calibration.reason}")
         found += [f"{what.replace('_', ' ')} not found: {why}" for what, why in calibration.refused.items()]
+    found += [line for line in [contents.clocks.get(subject)] if line]
     found += implausible(report.motions)
     if contents.unreadable:
         counts = contents.unreadable.items()
