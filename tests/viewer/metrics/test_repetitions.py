@@ -107,3 +107,46 @@ def test_where_the_zero_is_and_the_unit_change_nothing(shift: float, factor: flo
     angle = 30.0 * (1.0 - np.cos(2 * np.pi * time / 4.0))
     plain, other = repetitions(time, angle), repetitions(time + later, shift + factor * angle)
     assert [r.peak_s + later for r in plain] == pytest.approx([r.peak_s for r in other], abs=0.05)
+
+
+def curl(time: np.ndarray, at_s: float, way: float, dip: float) -> np.ndarray:
+    """Return a movement of this way and back whose top sinks once and comes back."""
+    parts = ((0.0, 1.0, way), (1.5, 1.0, -dip), (2.7, 1.0, dip), (4.5, 1.2, -way))
+    return sum(
+        (reach(time, at_s + later, seconds, size) for later, seconds, size in parts), np.zeros_like(time)
+    )
+
+
+@pytest.mark.parametrize("dip_deg", [5.0, 8.0, 15.0, 30.0, 45.0])
+@pytest.mark.parametrize("count", [1, 2, 8])
+def test_a_top_that_sinks_and_comes_back_is_one_repetition(dip_deg: float, count: int) -> None:
+    time = np.arange(0.0, 6.0 + 7.0 * count, 0.02)
+    angle = 10.0 + sum(curl(time, 2.0 + 7.0 * k, 100.0, dip_deg) for k in range(count))
+    found = movement_set(time, angle, FLOOR_DEG)
+    assert len(found.repetitions) == count
+    assert found.tries == ()
+    for one in found.repetitions:
+        assert one.to_s - one.from_s == pytest.approx(5.1, abs=0.4)
+
+
+def test_a_top_that_swings_back_is_one_repetition() -> None:
+    time = np.arange(0.0, 60.0, 0.02)
+    angle = np.full_like(time, 10.0)
+    for k in range(8):
+        since = time - 2.8 - 7.0 * k
+        angle += reach(time, 2.0 + 7.0 * k, 0.8, 100.0) - reach(time, 6.5 + 7.0 * k, 1.2, 100.0)
+        angle += np.where((since > 0) & (since < 3.7), 12.0 * np.exp(-since) * np.sin(5.65 * since), 0.0)
+    assert len(repetitions(time, angle, FLOOR_DEG)) == 8
+
+
+@pytest.mark.parametrize("rests", [0, 1, 2])
+def test_small_repetitions_of_an_arm_that_is_lifted_first_are_counted_each(rests: int) -> None:
+    """The arm hangs, is lifted by 45 deg, goes 15 deg further three times, hangs again."""
+    time = np.arange(0.0, 30.0 * (rests + 1), 0.02)
+    angle = np.zeros_like(time)
+    for block in range(rests + 1):
+        begin = 30.0 * block
+        angle += reach(time, begin + 1.0, 2.0, 45.0) - reach(time, begin + 26.0, 2.0, 45.0)
+        for k in range(3):
+            angle += reach(time, begin + 5.0 + 7 * k, 1.5, 15.0) - reach(time, begin + 8.0 + 7 * k, 1.5, 15.0)
+    assert len(repetitions(time, angle, FLOOR_DEG)) == 3 * (rests + 1)

@@ -22,6 +22,9 @@ SHARE = 0.5
 """A repetition goes, there and back, at least this part of what the set's larger ones go; less is a try."""
 TRY_SHARE = 0.15
 """Less than this part is no movement at all."""
+LIFTED = 3
+"""So many small movements on top of a large rise are repetitions of an arm that was lifted first; fewer are a
+repetition whose top is not still."""
 LEVEL = 0.1
 """A repetition begins and ends at this part of its height."""
 FLOOR_DEG = 3.5
@@ -76,7 +79,8 @@ def movement_set(time_s: Floats, values: Floats, floor: float = 0.0) -> Movement
         return MovementSet(repetitions=(), tries=())
     highest = max((s.height for s in _swings(v, max(floor, 0.05 * np.ptp(v)))), default=0.0)
     found = _swings(v, max(floor, TRY_SHARE * highest))
-    enough = SHARE * _typical([s.height for s in found])
+    rises = _swings(v, max(floor, SHARE * _highest(v)))
+    enough = SHARE * _typical(_heights(found, rises))
     whole = [s for s in _swings(v, max(floor, enough)) if s.height >= enough] if found else []
     spans = [_repetition(t, v, swing) for swing in whole]
     tries = [_repetition(t, v, s) for s in found if not any(_within(t[s.peak], r) for r in spans)]
@@ -86,6 +90,20 @@ def movement_set(time_s: Floats, values: Floats, floor: float = 0.0) -> Movement
 def repetitions(time_s: Floats, values: Floats, floor: float = 0.0) -> list[Repetition]:
     """Return the repetitions alone, as `movement_set` finds them."""
     return list(movement_set(time_s, values, floor).repetitions)
+
+
+def _highest(v: Floats) -> float:
+    """Return how far the largest rise goes, there and back, whatever lies between."""
+    before, after = np.minimum.accumulate(v), np.minimum.accumulate(v[::-1])[::-1]
+    return float(np.max(v - np.maximum(before, after)))
+
+
+def _heights(found: list[_Swing], rises: list[_Swing]) -> list[float]:
+    """Return how far each movement goes: of a large rise with fewer than LIFTED tops the rise itself."""
+    tops = [[s for s in found if rise.low <= s.peak < rise.end] for rise in rises]
+    whole = [(rise, on) for rise, on in zip(rises, tops, strict=True) if len(on) < LIFTED]
+    within = {s for _, on in whole for s in on}
+    return [rise.height for rise, _ in whole] + [s.height for s in found if s not in within]
 
 
 def _typical(heights: list[float]) -> float:
