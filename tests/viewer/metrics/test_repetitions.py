@@ -121,7 +121,9 @@ def curl(time: np.ndarray, at_s: float, way: float, dip: float) -> np.ndarray:
 @pytest.mark.parametrize("count", [1, 2, 8])
 def test_a_top_that_sinks_and_comes_back_is_one_repetition(dip_deg: float, count: int) -> None:
     time = np.arange(0.0, 6.0 + 7.0 * count, 0.02)
-    angle = 10.0 + sum(curl(time, 2.0 + 7.0 * k, 100.0, dip_deg) for k in range(count))
+    angle = np.full_like(time, 10.0)
+    for k in range(count):
+        angle += curl(time, 2.0 + 7.0 * k, 100.0, dip_deg)
     found = movement_set(time, angle, FLOOR_DEG)
     assert len(found.repetitions) == count
     assert found.tries == ()
