@@ -147,8 +147,8 @@ def test_a_change_is_shown_only_beyond_the_smallest_detectable_one(
     assert "elbow flexion, left, active over right" in shown.text
 
 
-def earlier(worn: Path, top_deg: float) -> SessionRecord:
-    """Return the session of a day before in which every repetition went so much less far."""
+def earlier(worn: Path, top_deg: float, days: int = 1) -> SessionRecord:
+    """Return the session of some days before in which every repetition went so much less far."""
     session = session_from_recording(worn)
     sets = []
     for one in session.sets:
@@ -165,7 +165,9 @@ def earlier(worn: Path, top_deg: float) -> SessionRecord:
             for r in one.measures.repetitions
         )
         sets.append(replace(one, measures=replace(one.measures, repetitions=repetitions)))
-    return replace(session, started_ns=session.started_ns - 86_400 * 10**9, sets=tuple(sets), recording="")
+    return replace(
+        session, started_ns=session.started_ns - days * 86_400 * 10**9, sets=tuple(sets), recording=""
+    )
 
 
 def test_what_nobody_wore_says_so_and_stands_beside_nothing(
@@ -186,6 +188,33 @@ def test_a_last_session_by_another_method_is_not_compared(worn: Path, tmp_path: 
     shown, _, found = written(worn, tmp_path, sessions=tmp_path / "store")
     assert found.compared == 0
     assert "another method" in shown.text
+
+
+def withheld(session: SessionRecord) -> SessionRecord:
+    """Return a session of which nothing can be compared."""
+    sets = []
+    for one in session.sets:
+        repetitions = tuple(
+            replace(
+                r, measures={n: replace(m, value=None, withheld="off plane") for n, m in r.measures.items()}
+            )
+            for r in one.measures.repetitions
+        )
+        sets.append(replace(one, measures=replace(one.measures, repetitions=repetitions)))
+    return replace(session, sets=tuple(sets))
+
+
+def test_a_session_that_withholds_its_range_gives_way_to_the_one_before(worn: Path, tmp_path: Path) -> None:
+    with Store.open(tmp_path / "store") as store:
+        store.add(withheld(earlier(worn, 50.0)))
+    shown, _, found = written(worn, tmp_path, sessions=tmp_path / "store")
+    assert found.compared == 0
+    assert "what could be compared is withheld here or there" in shown.text
+    with Store.open(tmp_path / "store") as store:
+        store.add(earlier(worn, 50.0, days=2))
+    shown, _, found = written(worn, tmp_path, sessions=tmp_path / "store")
+    assert found.compared > 0
+    assert "withheld here or there" not in shown.text
 
 
 def test_the_table_has_the_same_numbers_a_row_a_repetition(worn: Path, tmp_path: Path) -> None:

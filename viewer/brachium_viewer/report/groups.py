@@ -32,12 +32,12 @@ class Group:
 
 @dataclass(frozen=True, kw_only=True)
 class Past:
-    """A group's last session, and what of it can be compared."""
+    """A group's last session that can be compared, or its last one when none can."""
 
     started_ns: int
     pooled: SetMeasures
     changes: dict[str, Change]
-    """By COMPARED; empty when the measures were made by another method."""
+    """By COMPARED; empty when the measures were made by another method, or here or there were withheld."""
     method: int
 
 
@@ -68,20 +68,25 @@ def compared(measures: SetMeasures, name: str) -> Measure:
 
 
 def past(group: Group, history: History) -> Past | None:
-    """Return a group's last session; None when there is none."""
+    """Return a group's last session that can be compared; else its last one, or None when there is none."""
     found = history(group.exercise.name, group.side, group.mode)
-    if not found:
-        return None
-    last = [one for one in found if one.session == found[-1].session]
-    pooled = together([one.set.measures for one in last], group.exercise)
+    sessions: dict[int, list[PastSet]] = {}
+    for one in reversed(found):
+        sessions.setdefault(one.session, []).insert(0, one)
+    pasts = [_past(group, sets, found) for sets in sessions.values()]
+    return next((one for one in pasts if one.changes), next(iter(pasts), None))
+
+
+def _past(group: Group, sets: Sequence[PastSet], found: Sequence[PastSet]) -> Past:
+    pooled = together([one.set.measures for one in sets], group.exercise)
     changes = {}
-    if last[0].method == METHOD:
+    if sets[0].method == METHOD:
         for name in COMPARED:
             now, before = compared(group.pooled, name).value, compared(pooled, name).value
             if now is not None and before is not None:
                 smallest = smallest_of(found, group, name)
                 changes[name] = Change(now=now, before=before, smallest=smallest)
-    return Past(started_ns=last[0].started_ns, pooled=pooled, changes=changes, method=last[0].method)
+    return Past(started_ns=sets[0].started_ns, pooled=pooled, changes=changes, method=sets[0].method)
 
 
 def smallest_of(found: Sequence[PastSet], group: Group, name: str) -> SmallestChange:

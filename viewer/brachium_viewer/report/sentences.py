@@ -10,6 +10,7 @@ from brachium_viewer.report import words
 from brachium_viewer.report.build import Report
 from brachium_viewer.report.implausible import implausible
 from brachium_viewer.sessions.from_recording import readable, stops_between_sets
+from brachium_viewer.sessions.records import METHOD
 from brachium_wire.messages import Session
 
 
@@ -81,10 +82,12 @@ def why_no_comparison(report: Report) -> str:
         return ""
     if report.session.origin != "worn":
         return "Not put beside earlier sessions: what nobody wore is kept out of a person's history."
-    others = {past.method for past in report.pasts if past is not None}
-    if others:
-        return "Not put beside the last session: its numbers were found by another method; add it anew."
-    return "No earlier session of these exercises is known."
+    methods = {past.method for past in report.pasts if past is not None}
+    if not methods:
+        return "No earlier session of these exercises is known."
+    if METHOD in methods:
+        return "Not put beside an earlier session: what could be compared is withheld here or there."
+    return "Not put beside the last session: its numbers were found by another method; add it anew."
 
 
 def method(report: Report) -> list[str]:
