@@ -17,7 +17,8 @@ from brachium_nodes.movement import Variation
 from brachium_nodes.sensors import Level
 from brachium_viewer.exercises import EXERCISES, Exercise
 from brachium_viewer.metrics.arm_motion import JOINTS, ArmMotion
-from brachium_viewer.metrics.set_measures import SetMeasures, set_measures, values
+from brachium_viewer.metrics.medians import values
+from brachium_viewer.metrics.set_measures import SetMeasures, set_measures
 
 SESSIONS = {"sound": 60, "impaired": 40}
 """At each of two levels: 200 in all."""

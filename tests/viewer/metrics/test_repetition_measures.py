@@ -5,8 +5,9 @@ import pytest
 
 from brachium_viewer.exercises import EXERCISES
 from brachium_viewer.metrics.arm_motion import ArmMotion
+from brachium_viewer.metrics.medians import FEW, values
 from brachium_viewer.metrics.repetition_measures import NAMES, count, repetition_measures
-from brachium_viewer.metrics.set_measures import FEW, loss_between, set_measures, together, values
+from brachium_viewer.metrics.set_measures import SetMeasures, loss_between, set_measures, together
 
 TIME = np.arange(0.0, 60.0, 0.02)
 
@@ -24,7 +25,9 @@ def reaches(ways: list[float], base: float = 0.0, move_s: float = 1.5, hold_s: f
 def test_one_repetition_of_known_size(motion_of) -> None:
     motion = motion_of(TIME, {"elbow_flexion": reaches([80.0] * 3, base=20.0)})
     exercise = EXERCISES["elbow-flexion"]
-    found = [repetition_measures(motion, exercise, r, 90.0) for r in count(motion, exercise).repetitions]
+    found = [
+        repetition_measures(motion, exercise, r, "hand", 90.0) for r in count(motion, exercise).repetitions
+    ]
     assert len(found) == 3
     for one in found:
         numbers = {name: m.value for name, m in one.measures.items()}
@@ -161,3 +164,28 @@ def test_a_set_without_repetitions_says_whether_its_angle_was_measured(
     for one in (found, together([found, found], EXERCISES["elbow-flexion"])):
         assert said in one.medians["range"].withheld
         assert said in one.best_peak.withheld
+
+
+def test_a_set_tells_the_path_of_one_point(motion_of) -> None:
+    angle = reaches([80.0] * 6)
+    wrist = np.stack([0.3 * angle / 80.0, np.zeros_like(angle), np.zeros_like(angle)], axis=1)
+
+    def measured(lost_from_s: float, lost_to_s: float) -> SetMeasures:
+        motion: ArmMotion = motion_of(TIME, {"elbow_flexion": angle}, hand=1.6 * wrist)
+        motion.positions_m["wrist"][:] = wrist
+        motion.quality["hand"][(lost_from_s <= TIME) & (lost_to_s > TIME)] = "missing"
+        return set_measures(motion, EXERCISES["elbow-flexion"])
+
+    whole, died, blinked, late = (measured(*at) for at in ((0, 0), (12, 60), (5.2, 6.6), (6, 60)))
+    assert (whole.path_of, died.path_of, blinked.path_of, late.path_of) == ("hand", "wrist", "hand", "wrist")
+    assert values(whole.repetitions, "hand_path") == pytest.approx([0.48] * 6, abs=0.01)
+    assert values(died.repetitions, "hand_path") == pytest.approx([0.3] * 6, abs=0.01)
+    assert values(blinked.repetitions, "hand_path") == pytest.approx([0.48] * 5, abs=0.01)
+    same, other = (together(sets, EXERCISES["elbow-flexion"]) for sets in ((died, late), (whole, died)))
+    assert same.path_of == "wrist"
+    assert same.medians["hand_path"].value == pytest.approx(0.3, abs=0.01)
+    assert other.path_of == ""
+    for name in ("hand_path", "straightness"):
+        assert other.medians[name].withheld == "of the hand in one set, of the wrist in another"
+        assert other.first_to_last[name].value is None
+    assert other.medians["range"].value == pytest.approx(80.0, abs=0.3)

@@ -20,8 +20,8 @@ from brachium_viewer.report.language import in_language
 VIEWER = Path(brachium_viewer.__file__).parent
 SOURCES = [
     *sorted((VIEWER / "report").glob("*.py")),
-    *(VIEWER / "metrics" / f"{name}.py" for name in ("measure", "repetition_measures", "set_measures")),
-    VIEWER / "metrics" / "both_arms.py",
+    *(VIEWER / "metrics" / f"{name}.py" for name in ("measure", "medians", "both_arms")),
+    *(VIEWER / "metrics" / f"{name}.py" for name in ("repetition_measures", "set_measures")),
     VIEWER / "page_template.py",
     *(Path(brachium_wire.__file__).parent / f"{name}.py" for name in ("reading", "steady_times")),
 ]

@@ -1,6 +1,7 @@
 """What is measured of each repetition of an exercise. Pure."""
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -44,7 +45,7 @@ NAMES: dict[str, str] = {
 it went; `shoulder_shift`: the farthest that the shoulder moved (or shoulder and trunk, without a sternum
 sensor). Of the way there (`way_there`), be it up or down: `movement_time`; `mean_speed`, what the angle went
 over that time, so that a tremor on the way adds nothing; `peak_speed`, a tremor's too; `time_to_goal`, from
-its begin; smoothness; `hand_path` and `straightness`."""
+its begin; smoothness; `hand_path` and `straightness`, of the set's one point (`point_of`)."""
 
 ABOUT_S = 0.5
 """About the instant of its base an arm rests."""
@@ -53,7 +54,16 @@ AROUND_S = 2.0
 SMOOTH_GAP_S = 0.1
 """A longer gap in the way there may hide a jerk. So long a one makes LDLJ of a smooth reach wrong by up to
 0.15, and one of 0.3 s by 0.6."""
+OF_PLACES = ("hand_path", "straightness", "shoulder_shift", "trunk_lean")
+"""Of NAMES, what does not come from the exercise's angle."""
+NO_STERNUM = "a sensor on the sternum gives it"
 NO_WAY = "the way there has a gap or is too short"
+
+Point = Literal["hand", "wrist"]
+"""Of which a path is measured."""
+OF_THE_POINT = ("hand_path", "straightness")
+NEARLY = 0.05
+"""Of the time: a wrist that was measured for no more than that longer than the hand is not taken for it."""
 
 
 def rising(motion: ArmMotion, exercise: Exercise) -> Floats:
@@ -67,8 +77,18 @@ def count(motion: ArmMotion, exercise: Exercise) -> MovementSet:
     return movement_set(motion.time_s, rising(motion, exercise), FLOOR_DEG)
 
 
+def point_of(motion: ArmMotion) -> Point:
+    """Return whose path a whole set tells: the hand's, or the wrist's when that was measured for longer."""
+    hand, wrist = (_coverage(motion.measured(point)) for point in ("hand", "wrist"))
+    return "wrist" if wrist > hand + NEARLY else "hand"
+
+
 def repetition_measures(
-    motion: ArmMotion, exercise: Exercise, repetition: Repetition, goal_deg: float | None = None
+    motion: ArmMotion,
+    exercise: Exercise,
+    repetition: Repetition,
+    point: Point,
+    goal_deg: float | None = None,
 ) -> RepetitionMeasures:
     """Return the measures of one repetition; what cannot be trusted is withheld with its reason."""
     part = motion.between(repetition.from_s, repetition.to_s + 1e-6)
@@ -78,7 +98,8 @@ def repetition_measures(
     found = {
         **_of_the_angle(part, base, exercise),
         **_of_the_way(around, way, exercise),
-        **_of_places(part, around.between(*(way[:2] if way else (0.0, 0.0)))),
+        **_of_the_path(around, way, point),
+        **_of_the_trunk(part),
     }
     found["time_to_goal"] = _time_to_goal(part, way, exercise, goal_deg, found["range"])
     return RepetitionMeasures(
@@ -170,19 +191,22 @@ def _time_to_goal(
     return measure(max(at_s - way.from_s, 0.0), "s", of_range.coverage)
 
 
-def _of_places(part: ArmMotion, there: ArmMotion) -> dict[str, Measure]:
-    hand = "hand" if there.measured("hand").any() else "wrist"
-    seen = _coverage(there.measured(hand))
-    length, straightness = kinematics.path(
-        there.time_s, np.where(there.measured(hand)[:, None], there.positions_m[hand], np.nan)
-    )
+def _of_the_path(around: ArmMotion, way: Way | None, point: Point) -> dict[str, Measure]:
+    if way is None:
+        return {name: withheld(NO_WAY, NAMES[name]) for name in OF_THE_POINT}
+    there = around.between(way.from_s, way.to_s + 1e-6)
+    known = there.measured(point)
+    found = kinematics.path(there.time_s, np.where(known[:, None], there.positions_m[point], np.nan))
+    pairs = zip(OF_THE_POINT, found, strict=True)
+    return {name: measure(value, NAMES[name], _coverage(known)) for name, value in pairs}
+
+
+def _of_the_trunk(part: ArmMotion) -> dict[str, Measure]:
     shift = part.shoulder_shift_m
     known = np.isfinite(shift).all(axis=1)
     moved = np.linalg.norm(shift - shift[known][0], axis=1)[known].max() if known.any() else np.nan
     lean, lean_seen = _lean(part)
     return {
-        "hand_path": measure(length, "m", seen),
-        "straightness": measure(straightness, "1", seen),
         "shoulder_shift": (
             measure(float(moved), "m", _coverage(known))
             if known.any()
@@ -191,7 +215,7 @@ def _of_places(part: ArmMotion, there: ArmMotion) -> dict[str, Measure]:
         "trunk_lean": (
             measure(lean, "deg", lean_seen)
             if part.with_sternum
-            else withheld("a sensor on the sternum gives it", "deg")
+            else withheld(NO_STERNUM, "deg")
         ),
     }
 

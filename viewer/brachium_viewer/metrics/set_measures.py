@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 
@@ -10,18 +11,23 @@ from brachium_viewer.metrics import kinematics
 from brachium_viewer.metrics.arm_motion import ArmMotion
 from brachium_viewer.metrics.holes import unseen
 from brachium_viewer.metrics.measure import ENOUGH, Measure, measure, why_not, withheld
+from brachium_viewer.metrics.medians import best, first_to_last, medians, values
 from brachium_viewer.metrics.repetition_measures import (
     ABOUT_S,
     NAMES,
+    NO_STERNUM,
+    OF_PLACES,
+    OF_THE_POINT,
+    Point,
     RepetitionMeasures,
     count,
+    point_of,
     repetition_measures,
 )
 from brachium_viewer.metrics.repetitions import Repetition
 
 SHOULDER, SHOULDER_OR_TRUNK = "shoulder", "shoulder or trunk movement"
-FEW = 5
-"""First against last so many repetitions."""
+NO_REPETITION = "no repetition"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -39,17 +45,19 @@ class SetMeasures:
     """Movements that went less than half the way, and were seen whole: not repetitions."""
     repetitions: tuple[RepetitionMeasures, ...]
     medians: dict[str, Measure]
-    """Of the repetitions, by NAMES."""
+    """Of the repetitions, by NAMES; coverage is the share of those that have it."""
     best_peak: Measure
     """The farthest that the angle went in a repetition."""
     first_to_last: dict[str, Measure]
-    """Median of the last FEW repetitions minus that of the first FEW, by NAMES."""
+    """Median of the last repetitions minus that of the first, by NAMES."""
     extension_deficit: Measure
     """By how much the elbow stayed short of straight, deg; 0 when it went straight."""
     shoulder_word: str
     """What a shift of the shoulder may be: `shoulder` alone, or `shoulder or trunk movement`."""
     measured: float | None = None
     """Part of the set's time in which its angle was measured; None of a set measured before this was told."""
+    path_of: Point | Literal[""] = ""
+    """Whose paths are told; empty where it was not always the same, or was not told when it was measured."""
 
 
 def set_measures(
@@ -62,7 +70,8 @@ def set_measures(
     """Return the measures of a set; the motion is of the set alone."""
     done = count(motion, exercise)
     holes = unseen(motion.time_s, motion.measured(exercise.angle))
-    found = tuple(_seen(motion, exercise, one, goal_deg, holes) for one in done.repetitions)
+    point = point_of(motion)
+    found = tuple(_seen(motion, exercise, one, point, goal_deg, holes) for one in done.repetitions)
     none = _why_none(motion, exercise)
     return SetMeasures(
         exercise=exercise.name,
@@ -73,12 +82,13 @@ def set_measures(
         to_s=float(motion.time_s[-1]) if len(motion.time_s) else 0.0,
         tries=sum(_hole_of(one, holes) is None for one in done.tries),
         repetitions=found,
-        medians={name: _median(found, name, none) for name in NAMES},
-        best_peak=_best(found, rises=exercise.rises, none=none),
-        first_to_last={name: _change(found, name) for name in NAMES},
+        medians=medians(found, none),
+        best_peak=best(found, none, rises=exercise.rises),
+        first_to_last=first_to_last(found),
         extension_deficit=_deficit(motion),
         shoulder_word=_shoulder_word(motion, found),
         measured=float(motion.measured(exercise.angle).mean()) if len(motion.time_s) else 0.0,
+        path_of=point,
     )
 
 
@@ -86,6 +96,7 @@ def _seen(
     motion: ArmMotion,
     exercise: Exercise,
     repetition: Repetition,
+    point: Point,
     goal_deg: float | None,
     holes: Sequence[tuple[float, float]],
 ) -> RepetitionMeasures:
@@ -93,7 +104,7 @@ def _seen(
 
     What was done meanwhile may have been its farthest point, or the end of it and the begin of another.
     """
-    made = repetition_measures(motion, exercise, repetition, goal_deg)
+    made = repetition_measures(motion, exercise, repetition, point, goal_deg)
     hole = _hole_of(repetition, holes)
     if hole is None:
         return made
@@ -126,25 +137,35 @@ def _shoulder_word(motion: ArmMotion, found: Sequence[RepetitionMeasures]) -> st
 def together(sets: Sequence[SetMeasures], exercise: Exercise) -> SetMeasures:
     """Return several sets of one exercise by one arm in one mode as if they had been one.
 
-    Raises ValueError when there is none, or they are of different exercises, arms or modes.
+    The paths of a hand and of a wrist are not taken together: where sets tell both they are withheld. Raises
+    ValueError when there is none, or they are of different exercises, arms or modes.
     """
     if len({(one.exercise, one.side, one.mode) for one in sets}) != 1:
         raise ValueError("sets of one exercise by one arm in one mode can be taken together")
     found = tuple(repetition for one in sets for repetition in one.repetitions)
-    none = next((one.best_peak.withheld for one in sets if not one.repetitions), "")
+    points = {one.path_of for one in sets if values(one.repetitions, "hand_path")} or {sets[0].path_of}
+    if len(points) > 1:
+        found = tuple(_without_path(one) for one in found)
+    none = {name: median.withheld for name, median in sets[0].medians.items()}
     deficits = [one.extension_deficit for one in sets if one.extension_deficit.value is not None]
     return replace(
         sets[0],
         to_s=sets[-1].to_s,
         tries=sum(one.tries for one in sets),
         repetitions=found,
-        medians={name: _median(found, name, none) for name in NAMES},
-        best_peak=_best(found, rises=exercise.rises, none=none),
-        first_to_last={name: _change(found, name) for name in NAMES},
+        medians=medians(found, none),
+        best_peak=best(found, none, rises=exercise.rises),
+        first_to_last=first_to_last(found),
         extension_deficit=min(deficits, key=lambda one: one.value or 0.0, default=sets[0].extension_deficit),
         shoulder_word=min((one.shoulder_word for one in sets), key=[SHOULDER_OR_TRUNK, SHOULDER].index),
         measured=_measured(sets),
+        path_of=points.pop() if len(points) == 1 else "",
     )
+
+
+def _without_path(one: RepetitionMeasures) -> RepetitionMeasures:
+    why = "of the hand in one set, of the wrist in another"
+    return replace(one, measures=one.measures | {name: withheld(why, NAMES[name]) for name in OF_THE_POINT})
 
 
 def _measured(sets: Sequence[SetMeasures]) -> float | None:
@@ -155,40 +176,14 @@ def _measured(sets: Sequence[SetMeasures]) -> float | None:
     return sum(share * length for share, length in known) / seconds
 
 
-def values(found: tuple[RepetitionMeasures, ...], name: str) -> list[float]:
-    """Return the values of one measure, of the repetitions that have it."""
-    return [m.value for one in found if (m := one.measures[name]).value is not None]
-
-
-def _why_none(motion: ArmMotion, exercise: Exercise) -> str:
-    """Return why a set has no repetition: its angle was not measured, or nobody moved so."""
+def _why_none(motion: ArmMotion, exercise: Exercise) -> dict[str, str]:
+    """Return by NAMES why a set without repetitions has none: its angle was not measured, or nobody moved so;
+    what comes from elsewhere may not have been worn."""
+    why = NO_REPETITION
     if len(motion.time_s) and float(motion.measured(exercise.angle).mean()) < ENOUGH:
-        return why_not(motion.quality[exercise.angle])
-    return "no repetition"
-
-
-def _median(found: tuple[RepetitionMeasures, ...], name: str, none: str) -> Measure:
-    known = values(found, name)
-    if not known:
-        reasons = [one.measures[name].withheld for one in found]
-        return withheld(max(reasons, key=reasons.count) if reasons else none, NAMES[name])
-    return measure(float(np.median(known)), NAMES[name])
-
-
-def _best(found: tuple[RepetitionMeasures, ...], *, rises: bool, none: str) -> Measure:
-    known = values(found, "peak")
-    if not known:
-        return _median(found, "peak", none)
-    return measure(max(known) if rises else min(known), "deg")
-
-
-def _change(found: tuple[RepetitionMeasures, ...], name: str) -> Measure:
-    if len(found) < 2 * FEW:
-        return withheld(f"fewer than {2 * FEW} repetitions", NAMES[name])
-    first, last = values(found[:FEW], name), values(found[-FEW:], name)
-    if len(first) < FEW or len(last) < FEW:
-        return withheld("not known in all of them", NAMES[name])
-    return measure(float(np.median(last) - np.median(first)), NAMES[name])
+        why = why_not(motion.quality[exercise.angle])
+    found = {**dict.fromkeys(NAMES, why), **dict.fromkeys(OF_PLACES, NO_REPETITION)}
+    return found if motion.with_sternum else {**found, "trunk_lean": NO_STERNUM}
 
 
 def _deficit(motion: ArmMotion) -> Measure:

@@ -6,7 +6,8 @@ from datetime import UTC, datetime
 from brachium_viewer.figures import SegmentFigures
 from brachium_viewer.metrics.both_arms import Components
 from brachium_viewer.metrics.measure import Measure
-from brachium_viewer.metrics.set_measures import FEW, SHOULDER, SHOULDER_OR_TRUNK, values
+from brachium_viewer.metrics.medians import FEW, values
+from brachium_viewer.metrics.set_measures import SHOULDER, SHOULDER_OR_TRUNK
 from brachium_viewer.page_sections import PageTable
 from brachium_viewer.report import words
 from brachium_viewer.report.groups import Group, Past, Symmetry
@@ -82,11 +83,11 @@ def measures(groups: Sequence[Group]) -> PageTable:
     head = ["median of the repetitions", "unit"]
     head += [words.movement(g.exercise.name, g.side, "" if g.mode == "active" else g.mode) for g in groups]
     rows = []
-    for name, (label, digits) in words.MEASURES.items():
-        cells = [g.pooled.medians[name] for g in groups]
+    for name in words.MEASURES:
+        labels = [words.label(name, g.pooled.path_of) for g in groups]
         if name == "shoulder_shift":
-            label = f"{word}, {label}"
-        rows.append([label, cells[0].unit, *(number(cell, digits) for cell in cells)])
+            labels = [f"{word}, {label}" for label in labels]
+        rows += [_measure_row(groups, name, labels, label) for label in dict.fromkeys(labels)]
     deficits = [
         number(g.pooled.extension_deficit, 0) if g.exercise.angle == "elbow_flexion" else "" for g in groups
     ]
@@ -94,6 +95,14 @@ def measures(groups: Sequence[Group]) -> PageTable:
         rows.append(["short of straight", "deg", *deficits])
     rows.append(["measured", "%", *(_coverage(g) for g in groups)])
     return PageTable("Measures", head, rows)
+
+
+def _measure_row(groups: Sequence[Group], name: str, labels: Sequence[str], label: str) -> list[str]:
+    """Return the row of a label: the measure of those groups that call it so."""
+    found = [g.pooled.medians[name] for g in groups]
+    digits = words.MEASURES[name][1]
+    cells = [number(m, digits) if own == label else "" for m, own in zip(found, labels, strict=True)]
+    return [label, found[0].unit, *cells]
 
 
 def _coverage(group: Group) -> str:
@@ -187,8 +196,9 @@ def withheld(groups: Sequence[Group]) -> list[tuple[str, str]]:
     reasons: dict[str, dict[str, list[str]]] = {}
     for g in groups:
         where = words.movement(g.exercise.name, g.side, g.mode)
-        for name, (label, _) in words.MEASURES.items():
+        for name in words.MEASURES:
             if why := g.pooled.medians[name].withheld:
+                label = words.label(name, g.pooled.path_of)
                 reasons.setdefault(why, {}).setdefault(label, []).append(where)
     found = []
     for why, labels in reasons.items():

@@ -11,7 +11,7 @@ from brachium_viewer.metrics.smoothness import CUTOFF_HZ, LDLJ_RATE_HZ
 from brachium_viewer.sessions.records import SessionRecord
 from brachium_wire import table
 
-TEXTS = ("subject", "origin", "recording", "exercise", "side", "mode")
+TEXTS = ("subject", "origin", "recording", "exercise", "side", "mode", "path_of")
 COUNTS = ("set", "repetition")
 TIMES = ("from", "to", "peak_at")
 UNITS: dict[str, str] = {**dict.fromkeys(TIMES, "s"), **NAMES, "coverage": "1"}
@@ -57,6 +57,7 @@ def tidy(session: SessionRecord) -> list[dict[str, Any]]:
                     "exercise": exercise,
                     "side": side,
                     "mode": mode,
+                    "path_of": one.measures.path_of,
                     "set": number,
                     "repetition": i,
                     **_numbers(repetition),

@@ -17,15 +17,21 @@ MEASURES: Mapping[str, tuple[str, int]] = {
     "mean_speed": ("mean speed", 0),
     "movement_time": ("movement time", 1),
     "time_to_goal": ("time to goal", 1),
-    "hold_time": ("hold at the top", 1),
+    "hold_time": ("hold at the farthest point", 1),
     "sparc": ("smoothness, SPARC", 2),
     "ldlj": ("smoothness, LDLJ", 2),
-    "hand_path": ("hand path", 2),
+    "hand_path": ("path", 2),
     "straightness": ("straightness", 2),
     "shoulder_shift": ("translation", 3),
     "trunk_lean": ("trunk lean", 0),
 }
 """By measure: its name, and the digits that are worth reading."""
+
+PATHS: Mapping[str, Mapping[str, str]] = {
+    "hand": {"hand_path": "hand path", "straightness": "straightness of the hand path"},
+    "wrist": {"hand_path": "wrist path", "straightness": "straightness of the wrist path"},
+}
+"""By the point that a set's path is of: the names of what is measured of it."""
 
 ANGLES: Mapping[str, str] = {
     "elbow_flexion": "elbow flexion",
@@ -62,6 +68,11 @@ def ended(how: str, reason: str = "") -> str:
 def exercise(name: str) -> str:
     """Return an exercise's name as people read it."""
     return "free movement" if name == "free" else name.replace("-", " ")
+
+
+def label(name: str, path_of: str) -> str:
+    """Return a measure's name; a path's is that of its point."""
+    return PATHS.get(path_of, {}).get(name, MEASURES[name][0])
 
 
 def movement(name: str, side: str, mode: str = "") -> str:
