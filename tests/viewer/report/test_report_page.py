@@ -14,7 +14,7 @@ from brachium_viewer.metrics.change import STATED_SDC_DEG
 from brachium_viewer.report import page
 from brachium_viewer.report.words import DISCLAIMER
 from brachium_viewer.sessions.from_recording import session_from_recording
-from brachium_viewer.sessions.records import METHOD, SessionRecord, Subject
+from brachium_viewer.sessions.records import METHOD, SessionRecord, StoreError, Subject
 from brachium_viewer.sessions.store import Store
 from brachium_wire import keys, recording, table
 
@@ -242,5 +242,7 @@ def test_a_recording_without_marks_says_how_to_name_the_exercise(tmp_path: Path,
     assert found.sets == 0
     assert "name it with --exercise and --side" in shown.text
     told = ExerciseBegins(exercise="elbow-flexion", side="right")
+    with pytest.raises(StoreError, match=r"marked in it .*name no exercise"):
+        written(worn, tmp_path, without_marks=told)
     shown, _, found = written(tmp_path / "a.mcap", tmp_path, without_marks=told)
     assert found.repetitions >= 10

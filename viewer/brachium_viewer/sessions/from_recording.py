@@ -49,7 +49,8 @@ def session_from_recording(
     """Return the session that a recording holds; `subject` is needed where it holds several.
 
     `without_marks` is what was done in a recording in which nobody marked an exercise. Raises
-    recording.RecordingError for a file that is none, and StoreError when there is nothing of this subject.
+    recording.RecordingError for a file that is none, and StoreError when there is nothing of this subject,
+    or an exercise is named although some are marked.
     """
     contents = c.load(path)
     who = the_subject(contents, path.name, subject)
@@ -102,7 +103,11 @@ def session(
     marks = readable(contents.events.get(subject, ()))
     zero = zero_ns(contents, subject)
     end = max((zero + round(1e9 * float(m.time_s[-1])) + 1 for m in arms.values()), default=zero)
-    found = spans(marks, end) or _unmarked(contents, subject, arms, end, without_marks)
+    found = spans(marks, end)
+    if found and without_marks is not None:
+        marked = ", ".join(dict.fromkeys(f"{one.begins.exercise} {one.begins.side}" for one in found))
+        raise StoreError(f"{name}: what was done is marked in it ({marked}); name no exercise and no side")
+    found = found or _unmarked(contents, subject, arms, end, without_marks)
     said = contents.sessions.get(subject)
     return SessionRecord(
         subject=subject,
