@@ -11,7 +11,7 @@ from brachium_viewer.marks import Ended, StopReason, When
 from brachium_viewer.metrics.set_measures import SetMeasures
 from brachium_wire.messages import Origin
 
-METHOD = 2
+METHOD = 3
 """Of the measures: it rises whenever one of them would give another number for the same movement."""
 
 
