@@ -12,20 +12,24 @@ from brachium_viewer.metrics.measure import ENOUGH, Measure, measure, withheld
 def symmetry(affected: Measure, other: Measure) -> Measure:
     """Return one arm's measure over the other's, per cent: 100 is alike."""
     if affected.value is None or other.value is None:
-        return withheld("one side is not known", "%")
+        return withheld(_one_unknown(affected, other), "%")
     if abs(other.value) < 1e-9:
         return withheld("the other side did not move", "%")
-    return measure(100.0 * affected.value / other.value, "%")
+    return measure(100.0 * affected.value / other.value, "%", min(affected.coverage, other.coverage))
 
 
 def asymmetry(one: Measure, other: Measure) -> Measure:
     """Return the difference of two measures of jerk or the like over their mean, per cent: 0 is alike."""
     if one.value is None or other.value is None:
-        return withheld("one side is not known", "%")
+        return withheld(_one_unknown(one, other), "%")
     middle = 0.5 * (abs(one.value) + abs(other.value))
     if middle < 1e-9:
         return withheld("neither side moved", "%")
-    return measure(100.0 * (one.value - other.value) / middle, "%")
+    return measure(100.0 * (one.value - other.value) / middle, "%", min(one.coverage, other.coverage))
+
+
+def _one_unknown(one: Measure, other: Measure) -> str:
+    return f"one side is not known: {one.withheld or other.withheld}"
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -196,5 +196,7 @@ def _deficit(motion: ArmMotion) -> Measure:
 def loss_between(active: SetMeasures, passive: SetMeasures) -> Measure:
     """Return by how much less far the arm goes by itself than when it is moved, deg ("active lag")."""
     if active.best_peak.value is None or passive.best_peak.value is None:
-        return withheld("one of both is not known", "deg")
-    return measure(abs(passive.best_peak.value - active.best_peak.value), "deg")
+        why = active.best_peak.withheld or passive.best_peak.withheld
+        return withheld(f"one of both is not known: {why}", "deg")
+    coverage = min(active.best_peak.coverage, passive.best_peak.coverage)
+    return measure(abs(passive.best_peak.value - active.best_peak.value), "deg", coverage)

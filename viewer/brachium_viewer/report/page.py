@@ -25,6 +25,7 @@ from brachium_viewer.report.build import (
 )
 from brachium_viewer.report.groups import lags, symmetries
 from brachium_viewer.report.language import in_language, speaker
+from brachium_viewer.report.withheld import withheld
 from brachium_viewer.sessions import from_recording as sessions
 from brachium_viewer.sessions.reading import open_to_read
 
@@ -109,14 +110,14 @@ def page(report: Report, language: str = ENGLISH) -> str:
     """Return the page's HTML: no script, nothing loaded from elsewhere."""
     session, groups = report.session, report.groups
     origin_title, origin_text = origin_words([session.origin])
-    shown = []
-    if groups:
-        shown = [
-            tables.within_session(groups),
-            tables.between_arms(symmetries(groups, report.affected)),
-            tables.active_passive(lags(groups)),
-            tables.principal(principal_components(report)),
-        ]
+    arms, moved = symmetries(groups, report.affected), lags(groups)
+    parts = principal_components(report)
+    shown = [
+        tables.within_session(groups),
+        tables.between_arms(arms),
+        tables.active_passive(moved),
+        tables.principal(parts),
+    ]
     segments = {
         who: found
         for who, found in f.segments(report.contents).items()
@@ -144,7 +145,7 @@ def page(report: Report, language: str = ENGLISH) -> str:
         movements=movement_charts(report),
         measures=tables.measures(groups) if groups else None,
         tables=[table for table in shown if table is not None],
-        withheld=tables.withheld(groups),
+        withheld=withheld(groups, arms, moved, parts),
         quality=tables.quality(segments, batteries, longest_gaps(report)),
         method=sentences.method(report),
         disclaimer=words.DISCLAIMER,

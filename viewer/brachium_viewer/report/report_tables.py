@@ -11,6 +11,7 @@ from brachium_viewer.metrics.set_measures import SHOULDER, SHOULDER_OR_TRUNK
 from brachium_viewer.page_sections import PageTable
 from brachium_viewer.report import words
 from brachium_viewer.report.groups import Group, Past, Symmetry
+from brachium_viewer.report.withheld import LAST_BESIDE_FIRST
 from brachium_viewer.sessions.records import Rating
 
 NONE = "\N{EN DASH}"
@@ -29,9 +30,9 @@ def day(time_ns: int) -> str:
 
 
 def number(measure: Measure, digits: int, *, signed: bool = False) -> str:
-    """Return a value, with its coverage where it is not whole, or a dash."""
+    """Return a value, with its coverage where it is not whole; that a goal was not reached; or a dash."""
     if measure.value is None:
-        return NONE
+        return "not reached" if measure.withheld == words.NOT_REACHED else NONE
     value = round(measure.value, digits) + 0.0  # no minus zero
     shown = f"{value:+.{digits}f}" if signed and value else f"{value:.{digits}f}"
     return shown if measure.coverage >= FULL else f"{shown} ({100 * measure.coverage:.0f} %)"
@@ -112,7 +113,7 @@ def _coverage(group: Group) -> str:
 
 def within_session(groups: Sequence[Group]) -> PageTable | None:
     """Return the last five repetitions beside the first five; None when no group has as many."""
-    names = ("range", "peak_speed", "movement_time", "sparc")
+    names = LAST_BESIDE_FIRST
     rows = []
     for g in groups:
         cells = [g.pooled.first_to_last[name] for name in names]
@@ -189,37 +190,6 @@ def principal(found: Sequence[tuple[Group, Components | None]]) -> PageTable | N
         )
     head = ["variance explained, %", "1st", "2nd", "3rd", "the first one's directions"]
     return PageTable("Principal components of the joint angles", head, rows) if rows else None
-
-
-def withheld(groups: Sequence[Group]) -> list[tuple[str, str]]:
-    """Return what is not shown, and why: (reason, what), each reason once."""
-    reasons: dict[str, dict[str, list[str]]] = {}
-    for g in groups:
-        where = words.movement(g.exercise.name, g.side, g.mode)
-        for name in words.MEASURES:
-            if why := g.pooled.medians[name].withheld:
-                label = words.label(name, g.pooled.path_of)
-                reasons.setdefault(why, {}).setdefault(label, []).append(where)
-    found = []
-    for why, labels in reasons.items():
-        places = {tuple(where) for where in labels.values()}
-        everywhere = all(len(where) == len(groups) for where in places)
-        said = "" if everywhere else f" ({'; '.join(dict.fromkeys(w for where in places for w in where))})"
-        found.append((why, ", ".join(labels) + said))
-    partly = _partly(groups)
-    return [*found, *partly]
-
-
-def _partly(groups: Sequence[Group]) -> list[tuple[str, str]]:
-    found = []
-    for g in groups:
-        missing = [r.measures["range"] for r in g.pooled.repetitions if r.measures["range"].value is None]
-        if missing and len(missing) < len(g.pooled.repetitions):
-            reasons = [m.withheld for m in missing]
-            where = words.movement(g.exercise.name, g.side, g.mode)
-            what = f"range of {len(missing)} of {len(g.pooled.repetitions)} repetitions ({where})"
-            found.append((max(reasons, key=reasons.count), what))
-    return found
 
 
 def ratings(found: Iterable[Rating]) -> list[str]:

@@ -27,6 +27,9 @@ MEASURES: Mapping[str, tuple[str, int]] = {
 }
 """By measure: its name, and the digits that are worth reading."""
 
+NOT_REACHED = "the goal was not reached"
+"""Why a time to goal has no number: it is a result, nothing that was withheld."""
+
 PATHS: Mapping[str, Mapping[str, str]] = {
     "hand": {"hand_path": "hand path", "straightness": "straightness of the hand path"},
     "wrist": {"hand_path": "wrist path", "straightness": "straightness of the wrist path"},
