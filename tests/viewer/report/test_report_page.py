@@ -110,6 +110,10 @@ def test_it_tells_what_was_done_and_what_it_is_not(of_worn: tuple[Page, str, pag
         "stopped by the patient: dizzy",
         "shoulder or trunk movement",
         "AAOS reference",
+        "The way there begins where the speed, of the angle up to 1.6 Hz, last rises past 5 % of its peak",
+        "mean speed, how far the angle went over that time",
+        "where an exercise lowers its angle, the farthest is the lowest",
+        "hold at the farthest point",
         "SPARC up to 10 Hz",
         "LDLJ of its speed at 100 Hz",
         "abduction -30 to 30",
@@ -220,6 +224,7 @@ def test_a_session_that_withholds_its_range_gives_way_to_the_one_before(worn: Pa
 def test_the_table_has_the_same_numbers_a_row_a_repetition(worn: Path, tmp_path: Path) -> None:
     written(worn, tmp_path, csv=tmp_path / "a.csv")
     found = table.read(tmp_path / "a.csv")
+    assert set(found.columns["path_of"]) == {"hand"}
     session = session_from_recording(worn)
     repetitions = [(s, r) for s in session.sets for r in s.measures.repetitions]
     assert len(found) == len(repetitions) == 14

@@ -4,7 +4,11 @@ from importlib import metadata
 
 from brachium_body.lengths import from_measured
 from brachium_viewer.exercises import PLANES_DEG
+from brachium_viewer.metrics.kinematics import SPEED_CUTOFF_HZ
+from brachium_viewer.metrics.repetition_measures import SMOOTH_GAP_S
+from brachium_viewer.metrics.repetitions import CUTOFF_HZ as LOW_PASS_HZ
 from brachium_viewer.metrics.smoothness import CUTOFF_HZ, LDLJ_RATE_HZ
+from brachium_viewer.metrics.way_there import SLOW, SWAY_DEG_S
 from brachium_viewer.report import report_tables as tables
 from brachium_viewer.report import words
 from brachium_viewer.report.build import Report
@@ -98,13 +102,28 @@ def method(report: Report) -> list[str]:
     return [
         f"Measures by method {report.session.method}, Brachium {_version()}."
         + (f" Settings of fusion: {settings}." if settings else ""),
-        f"SPARC up to {CUTOFF_HZ:.0f} Hz of the way there; LDLJ of its speed at {LDLJ_RATE_HZ:.0f} Hz; both "
-        "are smoother closer to 0.",
+        *_way_there(),
         f"Elevation of the arm counts for an exercise in this band of its plane, deg: {bands}. Shoulder "
         f"angles are {words.SHOULDER}.",
-        "Ranges are from the resting start to the farthest point held for 0.2 s. AAOS reference: ranges of "
-        "healthy adults in general, not what is to be expected of one person.",
+        "Ranges are from the resting start to the farthest point held for 0.2 s; where an exercise lowers "
+        "its angle, the farthest is the lowest. AAOS reference: ranges of healthy adults in general, not "
+        "what is to be expected of one person.",
         *_lengths(report.contents.sessions.get(report.session.subject) or Session()),
+    ]
+
+
+def _way_there() -> list[str]:
+    """Return where a repetition's way there begins and ends, and what of it is measured."""
+    return [
+        f"The way there begins where the speed, of the angle up to {LOW_PASS_HZ:g} Hz, last rises past "
+        f"{100 * SLOW:.0f} % of its peak (at least {SWAY_DEG_S:g} deg/s) before the angle leaves the first "
+        "tenth of its range, and ends where it first falls below that in the last tenth; both ends are set "
+        "off so that a minimum-jerk reach keeps its length. A stop on the way is part of it, holding is not.",
+        "Of the way there, up or down, are: movement time; mean speed, how far the angle went over that "
+        f"time; peak speed, up to {SPEED_CUTOFF_HZ:.0f} Hz and a tremor's too; time to goal; path and "
+        f"straightness; smoothness: SPARC up to {CUTOFF_HZ:.0f} Hz and LDLJ of its speed at "
+        f"{LDLJ_RATE_HZ:.0f} Hz, both smoother closer to 0 (a minimum-jerk reach has -1.41 and -5.1), "
+        f"withheld where a gap of more than {SMOOTH_GAP_S:g} s is in it.",
     ]
 
 
