@@ -22,7 +22,11 @@ from brachium_wire import recording
 RUNS = 5
 MINUTES = 20.0
 
-# What cannot be seen as it was drawn: a figure without a size, one that leaves its page, a cut cell.
+SHEET_PX = int((210 - 2 * 12) / 25.4 * 96)
+"""Between an A4 sheet's margins, at 96 dots an inch: what is wider falls off, or shrinks all the print."""
+
+# What cannot be seen as it was drawn: a figure without a size, one that leaves its page, a cut cell, or
+# anything at all that is wider than the sheet.
 BROKEN = """
 () => {
   const wide = document.documentElement.clientWidth;
@@ -38,6 +42,9 @@ BROKEN = """
   }
   for (const cell of document.querySelectorAll('td, th, p'))
     if (cell.scrollWidth > cell.clientWidth + 1) bad.push(cell.textContent);
+  for (const part of document.querySelectorAll('h1, h2, p, ul, figure, table, td, th'))
+    if (part.getBoundingClientRect().right > wide + 1 || part.scrollWidth > wide + 1)
+      bad.push(`${part.tagName} is wider than the sheet: ${part.textContent.trim().slice(0, 60)}`);
   return bad;
 }
 """
@@ -107,11 +114,17 @@ def _read(file: Path) -> float:
 def look_at(page: Path, printed: Path) -> list[str]:
     """Print a page to PDF with a browser, and return what is broken on it."""
     with chromium() as browser:
-        view: Any = browser.new_page(viewport={"width": 794, "height": 1123})  # A4 at 96 dots an inch
-        view.goto(page.resolve().as_uri())
-        view.emulate_media(media="print")
-        broken: list[str] = view.evaluate(BROKEN)
-        view.pdf(path=str(printed), prefer_css_page_size=True, print_background=True)
+        return print_page(browser, page, printed)
+
+
+def print_page(browser: Any, page: Path, printed: Path) -> list[str]:
+    """Print a page to PDF with this browser, and return what is broken on it."""
+    view = browser.new_page(viewport={"width": SHEET_PX, "height": 1123})
+    view.goto(page.resolve().as_uri())
+    view.emulate_media(media="print")
+    broken: list[str] = view.evaluate(BROKEN)
+    view.pdf(path=str(printed), prefer_css_page_size=True, print_background=True)
+    view.close()
     return broken
 
 

@@ -85,18 +85,21 @@ def test_both_arms_of_a_recording_end_in_a_c3d_file_by_the_ending_of_out(live: P
 
 
 def test_what_was_marked_stands_in_the_file_at_its_time(live: Path, tmp_path: Path):
+    import ezc3d
     import kineticstoolkit
 
     out, study = tmp_path / "arms.c3d", tmp_path / "study"
     assert run("export", live, "--out", out, "--from", 0.2) == 0
     found = kineticstoolkit.read_c3d(str(out), convert_point_unit=False)["Points"].events
     assert [(event.name.split(":")[-1], round(event.time, 6)) for event in found] == [("exercise", 0.3)]
+    told = ezc3d.c3d(str(out))["parameters"]["EVENT"]["DESCRIPTIONS"]["value"]
+    assert told == ["elbow-flexion, left, active"]
     assert run("export", live, "--to", "motion-bids", "--out", study, "--from", 0.2) == 0
     (events,) = study.rglob("*_events.tsv")
     rows = [line.split("\t") for line in events.read_text().splitlines()]
     assert rows == [
         ["onset", "duration", "trial_type", "text"],
-        ["0.300000", "0", "exercise", "n/a"],
+        ["0.300000", "0", "exercise", "elbow-flexion, left, active"],
     ]
     assert run("export", live, "--out", tmp_path / "later.csv", "--from", 1.0) == 0
     (told,) = table.read(tmp_path / "later.csv").metadata["events"]

@@ -49,3 +49,25 @@ def test_a_rating_outside_its_scale_is_refused(value: int) -> None:
 def test_broken_data_are_refused_with_the_field() -> None:
     with pytest.raises(marks.BadMark, match="side"):
         marks.read(Event(time_ns=1, kind="exercise", data={"exercise": "free", "side": "middle"}))
+
+
+@pytest.mark.parametrize(
+    ("mark", "said"),
+    [
+        (marks.ExerciseBegins(exercise="drinking", side="left", mode="passive", limit_deg=100.5),
+         "drinking, left, passive, limit 100.5 deg"),
+        (marks.ExerciseBegins(exercise="free", side="right"), "free, right, active"),
+        (marks.ExerciseEnds(reason="stopped"), "stopped"),
+        (marks.Pain(value=3, when="before"), "3 before"),
+        (marks.PatientStop(reason="dizzy"), "dizzy"),
+        (marks.Donning(), ""),
+    ],
+)  # fmt: skip
+def test_what_was_marked_is_said_in_words(mark: marks.Mark, said: str) -> None:
+    event = marks.event(mark, 1)
+    assert marks.in_words(event.kind, event.data) == said
+
+
+def test_other_events_and_broken_data_say_nothing() -> None:
+    assert marks.in_words("tap", {"strength": 3}) == ""
+    assert marks.in_words("exercise", {"exercise": "free", "side": "middle"}) == ""

@@ -22,6 +22,8 @@ LANGUAGES = (ENGLISH, *sorted(path.stem for path in REPORT.glob("*.json")))
 
 _BLANK = re.compile(r"\{(\w+)\}")
 _NUMBER = re.compile(r"[-+\N{MINUS SIGN}]?\d+(\.\d+)?")
+_TIME = re.compile(r"(\d{4})-(\d\d)-(\d\d)(?: (\d\d:\d\d UTC))?")
+"""A day, or one with hour and minute."""
 _DOT = " \N{MIDDLE DOT} "
 _LISTS = {", ": ", ", " and ": ", "}
 _JOINTS = {"; ": "; ", ". ": ". "}
@@ -77,6 +79,9 @@ class Catalogue:
     def _word(self, value: str) -> str | None:
         if _NUMBER.fullmatch(value):
             return value.replace(".", ",")
+        if found := _TIME.fullmatch(value):
+            year, month, day, hour = found.groups()
+            return f"{day}.{month}.{year}" + (f", {hour}" if hour else "")
         if value in self._exact:
             return self._exact[value]
         small = self._exact.get(value[:1].lower() + value[1:])

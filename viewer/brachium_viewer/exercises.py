@@ -27,6 +27,9 @@ class Exercise:
     """The angle (angles.COLUMNS) that rises once a repetition."""
     rises: bool = True
     """False: a repetition lowers the angle, and its range is counted downwards."""
+    single: bool = True
+    """Whether one rise and fall of its angle is all of a repetition. False: it rises on the way as well, so
+    that a smaller rise says nothing of what a person tried."""
     plane: Plane | None = None
     """Of an elevation: its repetitions count in this band only."""
     goal_deg: float | None = None
@@ -108,11 +111,13 @@ EXERCISES: Mapping[str, Exercise] = {
             name="drinking",
             angle="elbow_flexion",
             goal_deg=110.0,
+            single=False,
             text="Take a cup to the mouth, and put it back.",
         ),
         Exercise(
             name="free",
             angle="elbow_flexion",
+            single=False,
             text="Move as you like.",
         ),
     )

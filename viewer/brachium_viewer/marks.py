@@ -3,7 +3,7 @@
 A mark is a wire message `event`; its kind is one of KINDS and its data are the mark's fields.
 """
 
-from typing import Literal
+from typing import Any, Literal
 
 import msgspec
 
@@ -108,3 +108,25 @@ def read(message: Event) -> Mark | None:
         return msgspec.convert(message.data, kind)
     except msgspec.ValidationError as error:
         raise BadMark(f"event {message.kind}: {error}") from None
+
+
+def in_words(kind: str, data: dict[str, Any]) -> str:
+    """Return what the data of an event say, in a few words: which exercise, how much pain.
+
+    Empty where they say nothing, for events of other kinds, and for data that are not those of their kind.
+    """
+    try:
+        mark = read(Event(time_ns=1, kind=kind, data=data))
+    except BadMark:
+        return ""
+    match mark:
+        case ExerciseBegins():
+            limits = (("goal", mark.goal_deg), ("limit", mark.limit_deg))
+            degrees = [f"{name} {value:g} deg" for name, value in limits if value is not None]
+            return ", ".join([mark.exercise, mark.side, mark.mode, *degrees])
+        case Pain() | Effort():
+            return f"{mark.value} {mark.when}"
+        case ExerciseEnds() | PatientStop():
+            return mark.reason
+        case _:
+            return ""

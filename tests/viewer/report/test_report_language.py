@@ -45,7 +45,6 @@ PARTS = {
     "Session of",
     "{} repeated donnings",  # of lines that are put together: MADE
     "free movement",  # has the pages' line
-    "lower left",  # of a drawing
 }
 MADE = {
     "Session of {}, {}",
@@ -158,7 +157,7 @@ def test_another_language_is_refused_with_those_that_are_there():
     ],
 )  # fmt: skip
 def test_sentences_within_sentences(english, german):
-    assert c.catalogue("de").told(english) == german
+    assert c.catalogue("de").told(english).replace("\u00ad", "") == german  # where words may be parted
 
 
 def test_every_exercise_is_called_as_on_the_pages():

@@ -13,6 +13,8 @@ from brachium_viewer.contents import Contents, SensorContents
 from brachium_viewer.exercises import exercise
 from brachium_viewer.report import page, sentences, words
 from brachium_viewer.report import report_tables as tables
+from brachium_viewer.report.groups import groups
+from brachium_viewer.sessions.from_recording import session_from_recording
 from brachium_wire.messages import Calibration, Info, Session
 from brachium_wire.sequence import SequenceCounter
 
@@ -22,22 +24,38 @@ def report_of(calibration: Calibration) -> Any:
     return SimpleNamespace(session=SimpleNamespace(subject="p01"), contents=contents)
 
 
-def test_scores_are_words_with_units() -> None:
-    scores = {"sway_deg_upper_arm_r": 0.0124, "from_nominal_deg_forearm_r": 9.79}
+def test_of_a_calibrations_scores_the_worst_are_told_in_one_line() -> None:
+    arms = [f"{segment}_{side}" for side in "rl" for segment in ("upper_arm", "forearm", "hand")]
+    scores = {f"sway_deg_{segment}": 0.0124 + 0.001 * i for i, segment in enumerate(arms)}
+    scores |= {f"from_nominal_deg_{segment}": 9.79 - i for i, segment in enumerate(arms)}
     said = sentences.how_zero_was_set(
         report_of(Calibration(time_ns=1, state="done", pose="n-pose", scores=scores))
     )
     assert said == (
         "Zero in pose n-pose. Forward not known: headings are assumed. Scores of the calibration: "
-        "sway of upper arm r: 0.01 deg, way off the stated mounting of forearm r: 9.8 deg."
+        "largest sway 0.02 deg (hand l), largest way off the stated mounting 9.8 deg (upper arm r)."
     )
-    told = catalogue("de").told(said)
-    assert "Oberarm rechts schwankte um 0,01°, Unterarm rechts 9,8° neben dem vorgesehenen Sitz" in told
-    assert "Vorn nicht bekannt" in told
+    assert catalogue("de").told(said) == (
+        "Nullpunkt in der Haltung (hängende Arme). Vorn nicht bekannt: Richtungen sind angenommen. Güte der "
+        "Kalibrierung: größtes Schwanken 0,02° (Hand links), am weitesten neben dem vorgesehenen Sitz 9,8° "
+        "(Oberarm rechts)."
+    )
 
 
-def test_a_score_without_words_keeps_its_name() -> None:
-    assert words.score("elbow_share", 0.51234) == "elbow share 0.512"
+def test_a_score_that_no_reader_can_act_on_is_not_told() -> None:
+    assert words.scores({"unexplained_share_r": 0.51234}) == []
+
+
+@pytest.mark.parametrize(
+    ("english", "german"),
+    [
+        ("Session of p01, 2026-11-22 18:33 UTC", "Sitzung von p01, 22.11.2026, 18:33 UTC"),
+        ("deg; last session: 2026-11-20, 2026-11-22", "°; letzte Sitzung: 20.11.2026, 22.11.2026"),
+        ("recording 2026-11-22.mcap", "Aufzeichnung 2026-11-22.mcap"),
+    ],
+)
+def test_days_are_written_as_the_language_does(english: str, german: str) -> None:
+    assert catalogue("de").told(english) == german
 
 
 def test_an_exercise_that_no_table_holds_is_said_in_words() -> None:
@@ -120,3 +138,12 @@ def test_a_stop_between_sets_is_told_once_with_its_reason(told: dict[str, str]) 
 
 def test_a_long_pseudonym_breaks() -> None:
     assert "h1 { font-size: 17pt; overflow-wrap: anywhere; }" in page.TEMPLATE.read_text("utf-8")
+
+
+@pytest.mark.parametrize(("name", "tries"), [("elbow-flexion", "2"), ("drinking", tables.NONE)])
+def test_tries_are_counted_where_one_rise_is_one_repetition(worn: Any, name: str, tries: str) -> None:
+    one = session_from_recording(worn).sets[0]
+    (group,) = groups([replace(one, measures=replace(one.measures, exercise=name, tries=2))])
+    found = tables.done([group])
+    assert dict(zip(found.head, found.rows[0], strict=False))["tries"] == tries
+    assert ("A try is" in found.note) == (tries != tables.NONE)

@@ -12,6 +12,7 @@ from brachium_body.kinematics import JOINTS, TRUNK_FROM_THORAX, JointRotations
 from brachium_body.segments import SEGMENTS, SIDES, Side, arm_segments, suffix
 from brachium_body.sides import mirror_left
 from brachium_viewer.export.rows import PARTS, period_s
+from brachium_viewer.marks import in_words
 from brachium_wire.table import Table, TableError
 
 Floats = npt.NDArray[np.float64]
@@ -57,10 +58,17 @@ class Motion:
 
     @property
     def events(self) -> list[dict[str, Any]]:
-        """Return what was marked while the motion lasts, `time_s` counted from its first instant."""
+        """Return what was marked while the motion lasts, `time_s` counted from its first instant.
+
+        `text` says all of it: formats that have room for no data still tell which exercise it was.
+        """
         first, last = float(self.time_s[0]), float(self.time_s[-1])
         told = self.about.get("events", [])
-        return [e | {"time_s": e["time_s"] - first} for e in told if first <= e["time_s"] <= last]
+        return [
+            e | {"time_s": e["time_s"] - first, "text": _all_of(e)}
+            for e in told
+            if first <= e["time_s"] <= last
+        ]
 
     @property
     def ground_from_world(self) -> Floats:
@@ -72,6 +80,11 @@ class Motion:
         trunk = rotation.multiply(known[:1], rotation.inverse(TRUNK_FROM_THORAX))
         heading = float(rotation.heading(trunk)[0]) if len(trunk) else 0.0
         return rotation.multiply(rotation.inverse(TRUNK_FROM_THORAX), rotation.about(2, -heading))
+
+
+def _all_of(event: dict[str, Any]) -> str:
+    said = (in_words(str(event["kind"]), event.get("data") or {}), str(event["text"]))
+    return ": ".join(part for part in said if part)
 
 
 def motion(table: Table, about: dict[str, Any]) -> Motion:

@@ -15,7 +15,8 @@ from brachium_viewer.metrics.set_measures import SetMeasures
 from brachium_viewer.report import repetition_lines as lines
 from brachium_viewer.report import words
 from brachium_viewer.report.groups import Group, History, Past, groups, other_arm, past
-from brachium_viewer.report.report_charts import MovementLines, RangeBar
+from brachium_viewer.report.range_chart import RangeBar
+from brachium_viewer.report.report_charts import MovementLines
 from brachium_viewer.sessions.from_recording import zero_ns
 from brachium_viewer.sessions.records import SessionRecord
 
@@ -108,7 +109,7 @@ def range_bars(report: Report) -> list[RangeBar]:
 
 
 def _ends(measures: SetMeasures) -> tuple[float, float] | None:
-    start, peak = measures.medians["start"].value, measures.best_peak.value
+    start, peak = measures.medians["start"].value, measures.medians["peak"].value
     return None if start is None or peak is None else (start, peak)
 
 

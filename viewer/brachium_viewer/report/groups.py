@@ -12,7 +12,7 @@ from brachium_viewer.metrics.measure import Measure
 from brachium_viewer.metrics.set_measures import SetMeasures, loss_between, together
 from brachium_viewer.sessions.records import METHOD, PastSet, SetRecord
 
-COMPARED = ("range", "best peak")
+COMPARED = ("range", "farthest of all")
 """What is compared with the last session: the only measures whose smallest detectable change is known."""
 
 History = Callable[[str, str, str], Sequence[PastSet]]

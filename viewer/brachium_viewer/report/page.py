@@ -12,7 +12,7 @@ from brachium_viewer.catalogue import ENGLISH
 from brachium_viewer.marks import ExerciseBegins
 from brachium_viewer.page_sections import Chart
 from brachium_viewer.page_template import origin_words, render
-from brachium_viewer.report import report_charts, sentences, tidy, words
+from brachium_viewer.report import measure_tables, report_charts, sentences, tidy, words
 from brachium_viewer.report import report_tables as tables
 from brachium_viewer.report.build import (
     Report,
@@ -25,6 +25,7 @@ from brachium_viewer.report.build import (
 )
 from brachium_viewer.report.groups import lags, symmetries
 from brachium_viewer.report.language import in_language, speaker
+from brachium_viewer.report.range_chart import LEGEND, ranges
 from brachium_viewer.report.withheld import withheld
 from brachium_viewer.sessions import from_recording as sessions
 from brachium_viewer.sessions.reading import open_to_read
@@ -143,7 +144,7 @@ def page(report: Report, language: str = ENGLISH) -> str:
         comparison=tables.comparison(groups, report.pasts),
         why_no_comparison=sentences.why_no_comparison(report),
         movements=movement_charts(report),
-        measures=tables.measures(groups) if groups else None,
+        measures=measure_tables.measures(groups) if groups else [],
         tables=[table for table in shown if table is not None],
         withheld=withheld(groups, arms, moved, parts),
         quality=tables.quality(segments, batteries, longest_gaps(report)),
@@ -173,4 +174,5 @@ def movement_charts(report: Report) -> list[Chart]:
 def _ranges(report: Report, language: str) -> str:
     said = speaker(language)  # now: the drawing makes room for its labels
     bars = [replace(bar, label=said(bar.label)) for bar in range_bars(report)]
-    return report_charts.ranges("ranges", bars) if bars else ""
+    legend = {name: said(text) for name, text in LEGEND.items()}
+    return ranges("ranges", bars, legend) if bars else ""

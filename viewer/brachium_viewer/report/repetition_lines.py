@@ -48,11 +48,17 @@ def at(time_s: Floats, values: Floats, wanted_s: Floats) -> Floats:
 
 def overlays(motion: ArmMotion, angle: str, repetitions: Iterable[RepetitionMeasures]) -> Floats:
     """Return an angle (repetitions, len(SHARES)) deg over the repetitions' own time, NaN in gaps."""
-    known = motion.known(angle)[:, None]
-    lines = [
-        at(motion.time_s, known, r.from_s + (r.to_s - r.from_s) * SHARES / 100.0)[:, 0] for r in repetitions
-    ]
-    return np.array(lines).reshape(len(lines), len(SHARES))
+    wanted = [r.from_s + (r.to_s - r.from_s) * SHARES / 100.0 for r in repetitions]
+    return _all_at(motion.time_s, motion.known(angle)[:, None], wanted)[:, :, 0]
+
+
+def _all_at(time_s: Floats, values: Floats, wanted_s: Sequence[Floats]) -> Floats:
+    """Return values (n, k) at lists of as many wanted times each, (lists, times, k): asked for at once, for a
+    session is long and each question goes through all of it."""
+    if not wanted_s:
+        return np.zeros((0, 0, values.shape[1]))
+    found = at(time_s, values, np.concatenate(wanted_s))
+    return found.reshape(len(wanted_s), -1, values.shape[1])
 
 
 def measured_places(motion: ArmMotion) -> dict[str, Floats]:
@@ -70,10 +76,7 @@ def paths(motion: ArmMotion, repetitions: Iterable[RepetitionMeasures]) -> dict[
     """Return the way of each measured joint (repetitions, PATH_POINTS, 3) cm."""
     places = measured_places(motion)
     wanted = [np.linspace(r.from_s, r.to_s, PATH_POINTS) for r in repetitions]
-    return {
-        joint: np.array([at(motion.time_s, place, w) for w in wanted]).reshape(len(wanted), PATH_POINTS, 3)
-        for joint, place in places.items()
-    }
+    return {joint: _all_at(motion.time_s, place, wanted) for joint, place in places.items()}
 
 
 def over_time(motion: ArmMotion, from_s: float, to_s: float) -> tuple[Floats, dict[str, Floats]]:

@@ -1,20 +1,18 @@
-"""The report's figures as SVG: repetitions over each other, paths in three views, ranges of motion."""
+"""The report's figures of a movement as SVG: repetitions over each other, paths in three views, over time."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from brachium_viewer.charts import GRID, INK, QUIET, new_figure, plain, svg
+from brachium_viewer.charts import INK, QUIET
 from brachium_viewer.metrics.arm_motion import Floats
-from brachium_viewer.report.panels import TEXT, Panel, Sheet, apart, reach, round_numbers
+from brachium_viewer.report.panels import BESIDE_IN, TEXT, Panel, Sheet, apart, reach, round_numbers
 from brachium_viewer.report.repetition_lines import SHARES
 
 MODE_COLOURS = {"active": "#0b5cad", "assisted": "#117a65", "passive": "#c2570c"}
 JOINT_COLOURS = {"elbow": "#c2570c", "wrist": "#117a65", "hand": "#0b5cad"}
-BAND = "#e3e9ef"
 VIEWS = (("from the front", 0, 2), ("from the side", 1, 2), ("from above", 0, 1))
 """Trunk axes: x to the right, y forward, z up."""
 AXIS_NAMES = ("right", "forward", "up")
@@ -67,7 +65,6 @@ def _overlay(sheet: Sheet, lines: MovementLines) -> None:
     ticks = round_numbers(spans, 5)
     panel.frame((0.0, 50.0, 100.0), ticks)
     panel.name_x("% of the repetition")
-    panel.name_y("deg", ticks)
     panel.title(lines.angle)
 
 
@@ -110,93 +107,13 @@ def _over_time(sheet: Sheet, lines: MovementLines) -> None:
     x = 0.0, max(float(lines.time_s[-1]), 1e-3)
     for i, name in enumerate(AXIS_NAMES):
         y = reach(place[:, i] for place in lines.places.values())
-        corner_in, size_in = (5.72, 0.34 + 0.36 * (2 - i)), (1.36, 0.29)
+        corner_in, size_in = (5.72, 0.34 + 0.36 * (2 - i)), (1.12, 0.29)
         panel = Panel(sheet=sheet, corner_in=corner_in, size_in=size_in, x=x, y=y)
         for joint, place in lines.places.items():
             panel.line(_points(lines.time_s, place[:, i]), JOINT_COLOURS[joint], 0.8)
         panel.frame(round_numbers(x, 3), round_numbers(y, 3), numbers=i == 2)
-        sheet.text(corner_in[0] + 1.01 * size_in[0], corner_in[1] + 0.5 * size_in[1], name, QUIET,
-                   rotation=270, fontsize=TEXT - 1.2, va="center", ha="left")  # fmt: skip
+        beside_in = corner_in[0] + size_in[0] + BESIDE_IN
+        sheet.text(beside_in, corner_in[1] + 0.5 * size_in[1], name, QUIET, va="center", ha="left")
         if i == 2:
             panel.name_x("s, of one set")
     sheet.text(5.72, 1.43, "over time, cm", fontsize=TEXT + 0.4, va="center")
-
-
-@dataclass(frozen=True, kw_only=True)
-class RangeBar:
-    """One row of the chart of ranges, deg; what is not known is None."""
-
-    label: str
-    mode: str
-    now: tuple[float, float] | None
-    """From the median start to the best peak."""
-    other: tuple[float, float] | None
-    last: tuple[float, float] | None
-    reference: tuple[float, float] | None
-    """AAOS."""
-    need: tuple[float, float] | None
-    """Of daily activities."""
-
-
-LEGEND = ("this session", "other side", "last session", "AAOS reference", "daily activities (Namdari 2012)")
-
-
-def ranges(name: str, bars: Sequence[RangeBar]) -> str:
-    """Return a row a movement: the reference as a wide band, this session, the other arm, the last one."""
-    height = 0.6 + 0.29 * len(bars)
-    figure = new_figure(WIDTH_IN, height)
-    axes = figure.add_subplot()
-    plain(axes)
-    axes.grid(visible=False)
-    axes.grid(axis="x", color=GRID, linewidth=0.6)
-    for i, bar in enumerate(bars):
-        y = len(bars) - 1 - i
-        if bar.reference is not None:
-            _bar(axes, y, bar.reference, 0.74, BAND)
-        if bar.need is not None:
-            _bar(axes, y - 0.33, bar.need, 0.07, "#8a97a5")
-        _thin(axes, y + 0.27, bar.other, QUIET, "s")
-        _thin(axes, y - 0.22, bar.last, INK, "D")
-        if bar.now is not None:
-            _bar(axes, y + 0.02, bar.now, 0.3, MODE_COLOURS.get(bar.mode, INK))
-            low, high = sorted(bar.now)
-            axes.text(high + 1.5, y + 0.02, f"{low:.0f} to {high:.0f}", fontsize=7.2, color=INK, va="center")
-    axes.set_ylim(-0.55, len(bars) - 0.45)
-    axes.set_yticks(range(len(bars)), [bar.label for bar in bars][::-1], fontsize=7.6, color=INK)
-    axes.tick_params(axis="y", length=0)
-    axes.set_xlabel("deg", fontsize=7.5, color=QUIET, labelpad=1)
-    low, high = axes.get_xlim()
-    axes.set_xlim(low, high + 0.06 * (high - low))
-    axes.legend(handles=_handles(bars), fontsize=6.8, frameon=False, ncols=5, loc="lower left",
-                bbox_to_anchor=(-0.02, 1.0), labelcolor=INK, handlelength=1.4, columnspacing=1.2)  # fmt: skip
-    return svg(figure, name)
-
-
-def _handles(bars: Sequence[RangeBar]) -> list[Any]:
-    from matplotlib.lines import Line2D
-    from matplotlib.patches import Patch
-
-    made = [
-        Patch(color=MODE_COLOURS["active"], label=LEGEND[0]),
-        Line2D([], [], color=QUIET, marker="s", markersize=3, linewidth=1.0, label=LEGEND[1]),
-        Line2D([], [], color=INK, marker="D", markersize=3, linewidth=1.0, label=LEGEND[2]),
-        Patch(color=BAND, label=LEGEND[3]),
-        Patch(color="#8a97a5", label=LEGEND[4]),
-    ]
-    there = (
-        any(bar.now for bar in bars),
-        any(bar.other for bar in bars),
-        any(bar.last for bar in bars),
-        any(bar.reference for bar in bars),
-        any(bar.need for bar in bars),
-    )
-    return [handle for handle, shown in zip(made, there, strict=True) if shown]
-
-
-def _bar(axes: Any, y: float, ends: tuple[float, float], height: float, colour: str) -> None:
-    axes.barh(y, ends[1] - ends[0], left=ends[0], height=height, color=colour)
-
-
-def _thin(axes: Any, y: float, ends: tuple[float, float] | None, colour: str, marker: str) -> None:
-    if ends is not None:
-        axes.plot(ends, (y, y), color=colour, linewidth=1.0, marker=marker, markersize=2.6)

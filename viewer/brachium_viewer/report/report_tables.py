@@ -7,7 +7,6 @@ from brachium_viewer.figures import SegmentFigures
 from brachium_viewer.metrics.both_arms import Components
 from brachium_viewer.metrics.measure import Measure
 from brachium_viewer.metrics.medians import FEW, values
-from brachium_viewer.metrics.set_measures import SHOULDER, SHOULDER_OR_TRUNK
 from brachium_viewer.page_sections import PageTable
 from brachium_viewer.report import words
 from brachium_viewer.report.groups import Group, Past, Symmetry
@@ -17,6 +16,7 @@ from brachium_viewer.sessions.records import Rating
 NONE = "\N{EN DASH}"
 FULL = 0.97
 """From so much on a measure's coverage is not printed beside it."""
+TRY = "A try is a movement that went less than half as far as the others; it is no repetition."
 
 
 def date(time_ns: int) -> str:
@@ -53,16 +53,15 @@ def done(groups: Sequence[Group]) -> PageTable:
                 group.mode,
                 str(len(group.sets)),
                 f"{made} of {wanted}" if wanted else str(made),
-                str(group.pooled.tries),
+                str(group.pooled.tries) if group.exercise.single else NONE,
                 NONE if goal is None else f"{goal:.0f}",
                 number(group.pooled.best_peak, 0),
                 f"{seconds / 60:.1f}",
                 ", ".join([*_limits(group), *sorted(ended)]),
             ]
         )
-    head = ["", "mode", "sets", "repetitions", "tries", "goal, deg", "farthest, deg", "min", ""]
-    note = "A try is a movement that went less than half as far as the others; it is no repetition."
-    return PageTable("What was done", head, rows, note)
+    head = ["", "mode", "sets", "repetitions", "tries", "goal, deg", "farthest of all, deg", "min", ""]
+    return PageTable("What was done", head, rows, TRY if any(g.exercise.single for g in groups) else "")
 
 
 def _limits(group: Group) -> list[str]:
@@ -76,39 +75,6 @@ def _limits(group: Group) -> list[str]:
         f"limit {limit:.0f} deg: passed in {sum(sign * top > sign * limit for top in found)} of {len(found)}"
         for limit, found in sorted(tops.items())
     ]
-
-
-def measures(groups: Sequence[Group]) -> PageTable:
-    """Return the medians of the repetitions: a row a measure, a column a group."""
-    word = min((g.pooled.shoulder_word for g in groups), key=[SHOULDER_OR_TRUNK, SHOULDER].index)
-    head = ["median of the repetitions", "unit"]
-    head += [words.movement(g.exercise.name, g.side, "" if g.mode == "active" else g.mode) for g in groups]
-    rows = []
-    for name in words.MEASURES:
-        labels = [words.label(name, g.pooled.path_of) for g in groups]
-        if name == "shoulder_shift":
-            labels = [f"{word}, {label}" for label in labels]
-        rows += [_measure_row(groups, name, labels, label) for label in dict.fromkeys(labels)]
-    deficits = [
-        number(g.pooled.extension_deficit, 0) if g.exercise.angle == "elbow_flexion" else "" for g in groups
-    ]
-    if any(deficits):
-        rows.append(["short of straight", "deg", *deficits])
-    rows.append(["measured", "%", *(_coverage(g) for g in groups)])
-    return PageTable("Measures", head, rows)
-
-
-def _measure_row(groups: Sequence[Group], name: str, labels: Sequence[str], label: str) -> list[str]:
-    """Return the row of a label: the measure of those groups that call it so."""
-    found = [g.pooled.medians[name] for g in groups]
-    digits = words.MEASURES[name][1]
-    cells = [number(m, digits) if own == label else "" for m, own in zip(found, labels, strict=True)]
-    return [label, found[0].unit, *cells]
-
-
-def _coverage(group: Group) -> str:
-    share = group.pooled.measured
-    return NONE if share is None else f"{100.0 * share:.0f}"
 
 
 def within_session(groups: Sequence[Group]) -> PageTable | None:

@@ -50,7 +50,7 @@ def how_zero_was_set(report: Report) -> str:
     if found is None or not (found.pose or found.mounting or found.state == "done"):
         return f"The recording holds no calibration. Forward: {facing}."
     pose = f"in pose {found.pose}" if found.pose else "from stated mountings"
-    scores = ", ".join(words.score(name, value) for name, value in found.scores.items())
+    scores = ", ".join(words.scores(found.scores))
     if not scores:
         return f"Zero {pose}. Forward {facing}."
     return f"Zero {pose}. Forward {facing}. Scores of the calibration: {scores}."

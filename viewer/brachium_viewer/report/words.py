@@ -83,11 +83,18 @@ def movement(name: str, side: str, mode: str = "") -> str:
     return f"{exercise(name)}, {side}" + (f", {mode}" if mode else "")
 
 
-def score(name: str, value: float) -> str:
-    """Return a calibration's score with its unit; one without words keeps its name."""
-    segment = name.rpartition("_deg_")[2].replace("_", " ")
-    if name.startswith("sway_deg_"):
-        return f"sway of {segment}: {value:.2f} deg"
-    if name.startswith("from_nominal_deg_"):
-        return f"way off the stated mounting of {segment}: {value:.1f} deg"
-    return f"{name.replace('_', ' ')} {value:.3g}"
+def scores(found: Mapping[str, float]) -> list[str]:
+    """Return the worst of a calibration's scores that a reader can act on: who moved, who sits elsewhere."""
+    said = []
+    if sway := _worst(found, "sway_deg_"):
+        said.append(f"largest sway {sway[0]:.2f} deg ({sway[1]})")
+    if off := _worst(found, "from_nominal_deg_"):
+        said.append(f"largest way off the stated mounting {off[0]:.1f} deg ({off[1]})")
+    return said
+
+
+def _worst(found: Mapping[str, float], kind: str) -> tuple[float, str] | None:
+    """Return the largest score of a kind, and of which segment it is."""
+    own = [(value, name.removeprefix(kind)) for name, value in found.items() if name.startswith(kind)]
+    value, segment = max(own, default=(0.0, ""))
+    return (value, segment.replace("_", " ")) if segment else None
