@@ -17,7 +17,12 @@ def configure(parser: argparse.ArgumentParser) -> None:
     """Add the options."""
     parser.add_argument("recording", type=Path, metavar="RECORDING", help="as brachium record writes it")
     parser.add_argument("--out", type=Path, required=True, metavar="FILE", help="the page, .html")
-    parser.add_argument("--csv", type=Path, metavar="FILE", help="one row a repetition, .csv or .parquet")
+    parser.add_argument(
+        "--csv",
+        type=Path,
+        metavar="FILE",
+        help="one row a repetition, .csv or .parquet; beside it, .sets.csv, what is said of sets",
+    )
     parser.add_argument(
         "--sessions", type=Path, metavar="DIR", help="earlier sessions, to stand beside this one"
     )
@@ -37,6 +42,7 @@ def run(args: argparse.Namespace) -> int:
     from brachium_viewer.exercises import EXERCISES
     from brachium_viewer.marks import ExerciseBegins
     from brachium_viewer.report import page
+    from brachium_viewer.report.tidy_sets import beside
 
     if (args.exercise is None) != (args.side is None):
         raise Usage("--exercise and --side go together")
@@ -73,6 +79,7 @@ def run(args: argparse.Namespace) -> int:
     print(f"{args.out}: {found.subject}{said}, {held}")
     if args.csv is not None:
         print(f"{args.csv}: one row a repetition")
+        print(f"{beside(args.csv)}: one row a number of the sets")
     return 0
 
 

@@ -12,7 +12,7 @@ from brachium_viewer.catalogue import ENGLISH
 from brachium_viewer.marks import ExerciseBegins
 from brachium_viewer.page_sections import Chart
 from brachium_viewer.page_template import origin_words, render
-from brachium_viewer.report import measure_tables, report_charts, sentences, tidy, words
+from brachium_viewer.report import measure_tables, report_charts, sentences, tidy, tidy_sets, words
 from brachium_viewer.report import report_tables as tables
 from brachium_viewer.report.build import (
     Report,
@@ -68,7 +68,7 @@ class ReportFigures:
 
 
 def write(settings: ReportSettings) -> ReportFigures:
-    """Write the page, and the table where one is wanted.
+    """Write the page, and the tables of repetitions and of sets where they are wanted.
 
     Raises recording.RecordingError for a file that is none, StoreError when there is nothing of the subject,
     TableError for a table of another ending, and MissingExtra without `brachium[report]`.
@@ -94,6 +94,9 @@ def write(settings: ReportSettings) -> ReportFigures:
     settings.out.write_text(text, encoding="utf-8")
     if settings.csv is not None:
         tidy.write(settings.csv, session, report.zero_ns)
+        every, parts = report.groups, principal_components(report)
+        rows = tidy_sets.rows(every, symmetries(every, report.affected), lags(every), parts)
+        tidy_sets.write(tidy_sets.beside(settings.csv), session, rows)
     changes = [change for past in report.pasts if past is not None for change in past.changes.values()]
     return ReportFigures(
         subject=who,

@@ -11,11 +11,12 @@ from brachium_viewer.metrics.smoothness import CUTOFF_HZ, LDLJ_RATE_HZ
 from brachium_viewer.sessions.records import SessionRecord
 from brachium_wire import table
 
-TEXTS = ("subject", "origin", "recording", "exercise", "side", "mode", "path_of")
+TEXTS = ("subject", "origin", "recording", "exercise", "side", "mode", "path_of", "shift_of")
 COUNTS = ("set", "repetition")
 TIMES = ("from", "to", "peak_at")
-UNITS: dict[str, str] = {**dict.fromkeys(TIMES, "s"), **NAMES, "coverage": "1"}
-"""Times count from the first skeleton."""
+COVERAGES = {f"coverage_{name}": "1" for name in NAMES}
+UNITS: dict[str, str] = {**dict.fromkeys(TIMES, "s"), **NAMES, **COVERAGES}
+"""Times count from the first skeleton. Coverage is how much was measured of the time that a measure is of."""
 
 
 def write(path: Path, session: SessionRecord, zero_ns: int) -> None:
@@ -58,6 +59,7 @@ def tidy(session: SessionRecord) -> list[dict[str, Any]]:
                     "side": side,
                     "mode": mode,
                     "path_of": one.measures.path_of,
+                    "shift_of": one.measures.shoulder_word,
                     "set": number,
                     "repetition": i,
                     **_numbers(repetition),
@@ -74,6 +76,6 @@ def _numbers(repetition: RepetitionMeasures) -> dict[str, Any]:
         "to": repetition.to_s,
         "peak_at": repetition.peak_s,
         **{name: np.nan if one.value is None else one.value for name, one in found.items()},
-        "coverage": found["range"].coverage,
+        **{f"coverage_{name}": one.coverage for name, one in found.items()},
         "withheld": "; ".join(reasons),
     }

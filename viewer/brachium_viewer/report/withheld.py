@@ -89,7 +89,7 @@ def _of_comparisons(
             yield Dash(lag.withheld, "farther when moved", words.movement(group.exercise.name, group.side))
     for group, found in parts:
         if found is None:
-            yield Dash("fewer than two joint angles were measured and moved", "components", _where(group))
+            yield Dash(words.NO_COMPONENTS, "components", _where(group))
 
 
 def _partly(group: Group) -> list[tuple[str, str]]:

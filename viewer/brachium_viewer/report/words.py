@@ -30,6 +30,8 @@ MEASURES: Mapping[str, tuple[str, int]] = {
 NOT_REACHED = "the goal was not reached"
 """Why a time to goal has no number: it is a result, nothing that was withheld."""
 
+NO_COMPONENTS = "fewer than two joint angles were measured and moved"
+
 PATHS: Mapping[str, Mapping[str, str]] = {
     "hand": {"hand_path": "hand path", "straightness": "straightness of the hand path"},
     "wrist": {"hand_path": "wrist path", "straightness": "straightness of the wrist path"},
