@@ -82,7 +82,7 @@ def way_there(time_s: Floats, values: Floats, repetition: Repetition) -> Way | N
     rows = np.clip([leaving - before, arriving + after], 0.0, len(grid) - 1.0)
     from_s, to_s = np.interp(rows, np.arange(len(grid)), grid).tolist()
     begin, end = np.interp(rows, np.arange(len(grid)), angle).tolist()
-    return Way(from_s, to_s, end - begin)
+    return Way(from_s, to_s, end - begin) if to_s > from_s else None
 
 
 def _rows_to_rest(speed: Floats, slow: float, off: float) -> float | None:
@@ -94,7 +94,7 @@ def _rows_to_rest(speed: Floats, slow: float, off: float) -> float | None:
     first = int(stops[0])
     soon = speed[first : first + 1 + round(AT_ONCE_S * RATE_HZ)]
     if not (soon < -slow).any():
-        return _crossing(speed, first, slow) + off
+        return max(0.0, _crossing(speed, first, slow) + off)
     return _crossing(speed, first + int(np.argmax(soon <= 0.0)), 0.0)
 
 
