@@ -33,8 +33,8 @@ NOT_REACHED = "the goal was not reached"
 NO_COMPONENTS = "fewer than two joint angles were measured and moved"
 
 PATHS: Mapping[str, Mapping[str, str]] = {
-    "hand": {"hand_path": "hand path", "straightness": "straightness of the hand path"},
-    "wrist": {"hand_path": "wrist path", "straightness": "straightness of the wrist path"},
+    "hand": {"hand_path": "hand path", "straightness": "straightness, hand"},
+    "wrist": {"hand_path": "wrist path", "straightness": "straightness, wrist"},
 }
 """By the point that a set's path is of: the names of what is measured of it."""
 
