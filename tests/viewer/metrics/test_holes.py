@@ -89,13 +89,24 @@ def test_a_repetition_with_a_hole_is_withheld_whole(from_s: float, to_s: float) 
     assert len(found.repetitions) - len(withheld) in (4, 5)
     for one in withheld:
         assert not any(m.value is not None for m in one.measures.values())
-        assert all(f"not measured for {to_s - from_s:.1f} s" in m.withheld for m in one.measures.values())
+        said = {name: m.withheld for name, m in one.measures.items()}
+        assert said.pop("trunk_lean") == "a sensor on the sternum gives it"
+        assert all(f"not measured for {to_s - from_s:.1f} s" in why for why in said.values())
     assert all(r in withheld for r in glued)
     rest = [r for r in found.repetitions if r not in withheld]
     assert len(rest) >= 4
     for one in rest:
         same = min(whole.repetitions, key=lambda other: abs(other.peak_s - one.peak_s))
         assert one.measures["range"].value == pytest.approx(same.measures["range"].value, abs=0.5)
+
+
+def test_what_nobody_asked_for_is_not_hidden_by_a_hole() -> None:
+    found = set_measures(recorded(~((T > 15.0) & (T < 35.0))), CURL)
+    assert {r.measures["time_to_goal"].withheld for r in found.repetitions} == {"no goal was set"}
+    assert found.medians["time_to_goal"].withheld == "no goal was set"
+    still = set_measures(recorded(T < 1.5), CURL)
+    assert still.medians["time_to_goal"].withheld == "no goal was set"
+    assert still.medians["range"].withheld == "no repetition"
 
 
 def test_a_hole_that_is_bridged_leaves_the_repetition() -> None:

@@ -57,6 +57,8 @@ SMOOTH_GAP_S = 0.1
 OF_PLACES = ("hand_path", "straightness", "shoulder_shift", "trunk_lean")
 """Of NAMES, what does not come from the exercise's angle."""
 NO_STERNUM = "a sensor on the sternum gives it"
+NO_SHIFT = "two sensors with raw samples on upper arm and forearm give it"
+NO_GOAL = "no goal was set"
 NO_WAY = "the way there has a gap or is too short"
 
 Point = Literal["hand", "wrist"]
@@ -178,10 +180,10 @@ def _of_the_way(around: ArmMotion, way: Way | None, exercise: Exercise) -> dict[
 def _time_to_goal(
     part: ArmMotion, way: Way | None, exercise: Exercise, goal_deg: float | None, of_range: Measure
 ) -> Measure:
+    if goal_deg is None:
+        return withheld(NO_GOAL, "s", of_range.coverage)
     if of_range.value is None:
         return withheld(of_range.withheld, "s", of_range.coverage)
-    if goal_deg is None:
-        return withheld("no goal was set", "s", of_range.coverage)
     if way is None:
         return withheld(NO_WAY, "s", of_range.coverage)
     sign = 1.0 if exercise.rises else -1.0
@@ -208,15 +210,9 @@ def _of_the_trunk(part: ArmMotion) -> dict[str, Measure]:
     lean, lean_seen = _lean(part)
     return {
         "shoulder_shift": (
-            measure(float(moved), "m", _coverage(known))
-            if known.any()
-            else withheld("two sensors with raw samples on upper arm and forearm give it", "m")
+            measure(float(moved), "m", _coverage(known)) if known.any() else withheld(NO_SHIFT, "m")
         ),
-        "trunk_lean": (
-            measure(lean, "deg", lean_seen)
-            if part.with_sternum
-            else withheld(NO_STERNUM, "deg")
-        ),
+        "trunk_lean": (measure(lean, "deg", lean_seen) if part.with_sternum else withheld(NO_STERNUM, "deg")),
     }
 
 

@@ -15,6 +15,8 @@ from brachium_viewer.metrics.medians import best, first_to_last, medians, values
 from brachium_viewer.metrics.repetition_measures import (
     ABOUT_S,
     NAMES,
+    NO_GOAL,
+    NO_SHIFT,
     NO_STERNUM,
     OF_PLACES,
     OF_THE_POINT,
@@ -72,7 +74,7 @@ def set_measures(
     holes = unseen(motion.time_s, motion.measured(exercise.angle))
     point = point_of(motion)
     found = tuple(_seen(motion, exercise, one, point, goal_deg, holes) for one in done.repetitions)
-    none = _why_none(motion, exercise)
+    none = _why_none(motion, exercise) | ({"time_to_goal": NO_GOAL} if goal_deg is None else {})
     return SetMeasures(
         exercise=exercise.name,
         side=motion.side,
@@ -111,9 +113,9 @@ def _seen(
     from_s, to_s = hole
     why = why_not(motion.between(from_s, to_s).quality[exercise.angle])
     said = f"not measured for {to_s - from_s:.1f} s of it: {why}"
-    return replace(
-        made, measures={name: withheld(said, one.unit, one.coverage) for name, one in made.measures.items()}
-    )
+    own = {n: one for n, one in made.measures.items() if one.withheld in (NO_GOAL, NO_STERNUM, NO_SHIFT)}
+    hidden = {name: withheld(said, one.unit, one.coverage) for name, one in made.measures.items()}
+    return replace(made, measures=hidden | own)
 
 
 def _hole_of(repetition: Repetition, holes: Sequence[tuple[float, float]]) -> tuple[float, float] | None:
