@@ -178,3 +178,21 @@ def test_smoothness_is_withheld_where_a_gap_may_hide_a_jerk(motion_of, gap_s: fl
             else:
                 assert smooth[0].value == pytest.approx(GOLDEN_SPARC, abs=0.01)
                 assert smooth[1].value == pytest.approx(GOLDEN_LDLJ, abs=0.25)
+
+
+@pytest.mark.parametrize("hold_s", [0.0, 1.0, 2.0, 5.0])
+def test_the_sway_of_an_arm_that_hardly_moves_does_not_decide(motion_of, hold_s: float) -> None:
+    t, angle = curls(count=12, way=8.0, base=40.0, seconds=2.0, hold_s=hold_s)
+    found = medians(motion_of, t, angle + sway(t, 0.5))
+    assert found["movement_time"] == pytest.approx(2.0, rel=0.15)
+    assert found["mean_speed"] == pytest.approx(4.0, rel=0.15)
+
+
+@pytest.mark.parametrize("period_s", [2.0, 4.0, 6.0])
+def test_to_and_fro_without_a_rest_turns_at_both_ends(motion_of, period_s: float) -> None:
+    t = np.arange(0.0, 2.0 + 5 * period_s + 2.0, 1.0 / RATE_HZ)
+    phase = np.clip((t - 2.0) / period_s, 0.0, 5.0)
+    found = set_measures(motion_of(t, {"elbow_flexion": 60.0 - 50.0 * np.cos(2 * np.pi * phase)}), CURL)
+    assert len(found.repetitions) == 5
+    for one in found.repetitions:
+        assert one.measures["movement_time"].value == pytest.approx(0.5 * period_s, rel=0.1)
