@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from brachium_viewer.metrics.both_arms import asymmetry, components, symmetry
+from brachium_viewer.metrics.both_arms import components, difference, symmetry
 from brachium_viewer.metrics.measure import measure, withheld
 
 TIME = np.arange(0.0, 40.0, 0.02)
@@ -15,13 +15,13 @@ def test_symmetry_is_one_arm_over_the_other() -> None:
     assert symmetry(measure(1.0, "deg"), measure(0.0, "deg")).value is None
 
 
-def test_asymmetry_changes_sign_with_the_arms() -> None:
-    one, other = measure(-7.0, "1"), measure(-5.0, "1")
-    there, back = asymmetry(one, other).value, asymmetry(other, one).value
-    assert there is not None
-    assert back is not None
-    assert there == pytest.approx(-back)
-    assert abs(there) == pytest.approx(100 * 2.0 / 6.0)
+def test_a_difference_is_told_in_its_unit_and_changes_sign_with_the_arms() -> None:
+    one, other = measure(-7.0, "1"), measure(-5.0, "1", 0.9)
+    there, back = difference(one, other), difference(other, one)
+    assert (there.value, back.value) == (-2.0, 2.0)
+    assert (there.unit, there.coverage) == ("1", 0.9)
+    lost = difference(withheld("lost", "1"), other)
+    assert (lost.value, lost.withheld) == (None, "one side is not known: lost")
 
 
 def test_two_angles_in_one_synergy_are_one_component(motion_of) -> None:

@@ -114,13 +114,22 @@ def test_first_against_last(motion_of) -> None:
     assert "fewer than 10" in few.first_to_last["range"].withheld
 
 
-def test_active_against_passive(motion_of) -> None:
-    exercise = EXERCISES["elbow-flexion"]
+@pytest.mark.parametrize(
+    ("name", "active_deg", "passive_deg", "lag"),
+    [("elbow-flexion", 80.0, 95.0, 15.0), ("elbow-flexion", 95.0, 80.0, -15.0),
+     ("external-rotation", 40.0, 50.0, 10.0), ("external-rotation", 50.0, 40.0, -10.0)],
+)  # fmt: skip
+def test_active_against_passive(
+    motion_of, name: str, active_deg: float, passive_deg: float, lag: float
+) -> None:
+    exercise = EXERCISES[name]
+    sign = 1.0 if exercise.rises else -1.0
     active, passive = (
-        set_measures(motion_of(TIME, {"elbow_flexion": reaches([way] * 3)}), exercise, mode=mode)
-        for way, mode in ((80.0, "active"), (95.0, "passive"))
+        set_measures(motion_of(TIME, {exercise.angle: sign * reaches([way] * 3)}), exercise, mode=mode)
+        for way, mode in ((active_deg, "active"), (passive_deg, "passive"))
     )
-    assert loss_between(active, passive).value == pytest.approx(15.0, abs=0.5)
+    found = loss_between(active, passive, rises=exercise.rises)
+    assert found.value == pytest.approx(lag, abs=0.5)
 
 
 def test_the_hands_way(motion_of) -> None:

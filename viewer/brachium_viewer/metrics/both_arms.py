@@ -18,14 +18,14 @@ def symmetry(affected: Measure, other: Measure) -> Measure:
     return measure(100.0 * affected.value / other.value, "%", min(affected.coverage, other.coverage))
 
 
-def asymmetry(one: Measure, other: Measure) -> Measure:
-    """Return the difference of two measures of jerk or the like over their mean, per cent: 0 is alike."""
+def difference(one: Measure, other: Measure) -> Measure:
+    """Return how far one arm's measure is above the other's, in its unit.
+
+    Of a logarithm as LDLJ this is what can be told: its part of a mean would say nothing of how much.
+    """
     if one.value is None or other.value is None:
-        return withheld(_one_unknown(one, other), "%")
-    middle = 0.5 * (abs(one.value) + abs(other.value))
-    if middle < 1e-9:
-        return withheld("neither side moved", "%")
-    return measure(100.0 * (one.value - other.value) / middle, "%", min(one.coverage, other.coverage))
+        return withheld(_one_unknown(one, other), one.unit)
+    return measure(one.value - other.value, one.unit, min(one.coverage, other.coverage))
 
 
 def _one_unknown(one: Measure, other: Measure) -> str:

@@ -195,10 +195,14 @@ def _deficit(motion: ArmMotion) -> Measure:
     return measure(max(0.0, low) if np.isfinite(low) else np.nan, "deg", coverage)
 
 
-def loss_between(active: SetMeasures, passive: SetMeasures) -> Measure:
-    """Return by how much less far the arm goes by itself than when it is moved, deg ("active lag")."""
+def loss_between(active: SetMeasures, passive: SetMeasures, *, rises: bool) -> Measure:
+    """Return by how much less far the arm goes by itself than when it is moved, deg ("active lag").
+
+    Below 0 it went farther by itself. `rises` says whether farther is up.
+    """
     if active.best_peak.value is None or passive.best_peak.value is None:
         why = active.best_peak.withheld or passive.best_peak.withheld
         return withheld(f"one of both is not known: {why}", "deg")
     coverage = min(active.best_peak.coverage, passive.best_peak.coverage)
-    return measure(abs(passive.best_peak.value - active.best_peak.value), "deg", coverage)
+    farther = passive.best_peak.value - active.best_peak.value
+    return measure(farther if rises else -farther, "deg", coverage)

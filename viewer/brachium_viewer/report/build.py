@@ -14,7 +14,17 @@ from brachium_viewer.metrics.both_arms import Components, components
 from brachium_viewer.metrics.set_measures import SetMeasures
 from brachium_viewer.report import repetition_lines as lines
 from brachium_viewer.report import words
-from brachium_viewer.report.groups import Group, History, Past, groups, other_arm, past
+from brachium_viewer.report.groups import (
+    Errors,
+    Group,
+    History,
+    Past,
+    What,
+    errors_of,
+    groups,
+    other_arm,
+    past,
+)
 from brachium_viewer.report.range_chart import RangeBar
 from brachium_viewer.report.report_charts import MovementLines
 from brachium_viewer.sessions.from_recording import zero_ns
@@ -33,6 +43,8 @@ class Report:
     motions: Mapping[Side, ArmMotion]
     groups: Sequence[Group]
     pasts: Sequence[Past | None]
+    errors: Mapping[What, Errors]
+    """What of each group's measures counts as a change."""
     affected: str
     """right, left, both, or empty when it is not stated."""
 
@@ -51,13 +63,15 @@ def build(
 ) -> Report:
     """Return the report; only a session that was worn is put beside a history."""
     every = groups(session.sets)
-    worn = session.origin == "worn"
+    found = [history(*group.what) if session.origin == "worn" else () for group in every]
+    errors = {group.what: errors_of(group, sets) for group, sets in zip(every, found, strict=True)}
     return Report(
         contents=contents,
         session=session,
         motions=motions,
         groups=every,
-        pasts=[past(group, history) if worn else None for group in every],
+        pasts=[past(group, sets, errors[group.what]) for group, sets in zip(every, found, strict=True)],
+        errors=errors,
         affected=affected,
     )
 

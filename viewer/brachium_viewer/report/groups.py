@@ -1,19 +1,24 @@
 """What a report is about: sets by exercise, arm and mode, beside each other and the past. Pure."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
 from brachium_body.segments import Side
 from brachium_viewer.exercises import Exercise, exercise
-from brachium_viewer.metrics.both_arms import asymmetry, symmetry
+from brachium_viewer.metrics.both_arms import difference, symmetry
 from brachium_viewer.metrics.change import Change, SmallestChange, smallest_change
 from brachium_viewer.metrics.measure import Measure
 from brachium_viewer.metrics.set_measures import SetMeasures, loss_between, together
 from brachium_viewer.sessions.records import METHOD, PastSet, SetRecord
 
-COMPARED = ("range", "farthest of all")
+FARTHEST = "farthest of all"
+COMPARED = ("range", FARTHEST)
 """What is compared with the last session: the only measures whose smallest detectable change is known."""
+
+What = tuple[str, str, str]
+Errors = Mapping[str, SmallestChange]
+"""By COMPARED: what is shown as a change, and what is within measurement error."""
 
 History = Callable[[str, str, str], Sequence[PastSet]]
 """A person's worn sets of an exercise, side and mode before this session, oldest first."""
@@ -28,6 +33,11 @@ class Group:
     mode: str
     sets: tuple[SetRecord, ...]
     pooled: SetMeasures
+
+    @property
+    def what(self) -> What:
+        """Return exercise, side and mode."""
+        return self.exercise.name, self.side, self.mode
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -67,38 +77,38 @@ def compared(measures: SetMeasures, name: str) -> Measure:
     return measures.medians["range"] if name == "range" else measures.best_peak
 
 
-def past(group: Group, history: History) -> Past | None:
+def past(group: Group, found: Sequence[PastSet], errors: Errors) -> Past | None:
     """Return a group's last session that can be compared; else its last one, or None when there is none."""
-    found = history(group.exercise.name, group.side, group.mode)
     sessions: dict[int, list[PastSet]] = {}
     for one in reversed(found):
         sessions.setdefault(one.session, []).insert(0, one)
-    pasts = [_past(group, sets, found) for sets in sessions.values()]
+    pasts = [_past(group, sets, errors) for sets in sessions.values()]
     return next((one for one in pasts if one.changes), next(iter(pasts), None))
 
 
-def _past(group: Group, sets: Sequence[PastSet], found: Sequence[PastSet]) -> Past:
+def _past(group: Group, sets: Sequence[PastSet], errors: Errors) -> Past:
     pooled = together([one.set.measures for one in sets], group.exercise)
     changes = {}
     if sets[0].method == METHOD:
         for name in COMPARED:
             now, before = compared(group.pooled, name).value, compared(pooled, name).value
             if now is not None and before is not None:
-                smallest = smallest_of(found, group, name)
-                changes[name] = Change(now=now, before=before, smallest=smallest)
+                changes[name] = Change(now=now, before=before, smallest=errors[name])
     return Past(started_ns=sets[0].started_ns, pooled=pooled, changes=changes, method=sets[0].method)
 
 
-def smallest_of(found: Sequence[PastSet], group: Group, name: str) -> SmallestChange:
-    """Return the smallest detectable change of a measure: from this person's repeated donnings, those of this
-    session too, or the stated one."""
+def errors_of(group: Group, found: Sequence[PastSet]) -> Errors:
+    """Return the smallest detectable changes: from this person's repeated donnings, in the sets found and in
+    this session, or the stated one."""
     sessions: dict[int, list[SetRecord]] = {}
     for one in found:
         if one.method == METHOD:
             sessions.setdefault(one.session, []).append(one.set)
-    return smallest_change(
-        [pair for sets in (*sessions.values(), list(group.sets)) for pair in donning_pairs(sets, name)]
-    )
+    every = [*sessions.values(), list(group.sets)]
+    return {
+        name: smallest_change([pair for sets in every for pair in donning_pairs(sets, name)])
+        for name in COMPARED
+    }
 
 
 def donning_pairs(sets: Sequence[SetRecord], name: str) -> list[tuple[float, float]]:
@@ -127,8 +137,10 @@ class Symmetry:
     other: Group
     range_percent: Measure
     """The first one's range over the other's."""
-    jerk_percent: Measure
-    """Difference of LDLJ over its mean."""
+    range_change: Measure
+    """The first one's range less the other's, deg."""
+    ldlj_change: Measure
+    """The first one's LDLJ less the other's: above 0, it moved more smoothly."""
 
 
 def symmetries(every: Sequence[Group], affected: str) -> list[Symmetry]:
@@ -146,17 +158,19 @@ def symmetries(every: Sequence[Group], affected: str) -> list[Symmetry]:
                 group=group,
                 other=other,
                 range_percent=symmetry(ours["range"], theirs["range"]),
-                jerk_percent=asymmetry(ours["ldlj"], theirs["ldlj"]),
+                range_change=difference(ours["range"], theirs["range"]),
+                ldlj_change=difference(ours["ldlj"], theirs["ldlj"]),
             )
         )
     return found
 
 
 def lags(every: Sequence[Group]) -> list[tuple[Group, Measure]]:
-    """Return, for each exercise and arm done both ways, by how much less far it goes by itself."""
+    """Return, for each exercise and arm done both ways, by how much less far it goes by itself (below 0:
+    farther)."""
     passive = {(g.exercise.name, g.side): g for g in every if g.mode == "passive"}
     return [
-        (g, loss_between(g.pooled, passive[key].pooled))
+        (g, loss_between(g.pooled, passive[key].pooled, rises=g.exercise.rises))
         for g in every
         if g.mode == "active" and (key := (g.exercise.name, g.side)) in passive
     ]

@@ -12,6 +12,7 @@ from brachium_viewer.catalogue import ENGLISH
 from brachium_viewer.marks import ExerciseBegins
 from brachium_viewer.page_sections import Chart
 from brachium_viewer.page_template import origin_words, render
+from brachium_viewer.report import comparison_tables as beside
 from brachium_viewer.report import measure_tables, report_charts, sentences, tidy, tidy_sets, words
 from brachium_viewer.report import report_tables as tables
 from brachium_viewer.report.build import (
@@ -118,8 +119,8 @@ def page(report: Report, language: str = ENGLISH) -> str:
     parts = principal_components(report)
     shown = [
         tables.within_session(groups),
-        tables.between_arms(arms),
-        tables.active_passive(moved),
+        beside.between_arms(arms, report.errors),
+        beside.active_passive(moved, groups, report.errors),
         tables.principal(parts),
     ]
     segments = {
@@ -144,7 +145,7 @@ def page(report: Report, language: str = ENGLISH) -> str:
         done=tables.done(groups) if groups else None,
         ratings=[*tables.ratings(session.ratings), *sentences.stops(report)],
         ranges=_ranges(report, language),
-        comparison=tables.comparison(groups, report.pasts),
+        comparison=beside.comparison(groups, report.pasts),
         why_no_comparison=sentences.why_no_comparison(report),
         movements=movement_charts(report),
         measures=measure_tables.measures(groups) if groups else [],

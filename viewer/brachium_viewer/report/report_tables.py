@@ -1,4 +1,4 @@
-"""The report's tables: what was done, measures, comparisons, what was withheld, data quality. Pure."""
+"""The report's tables: what was done, change within the session, components, data quality. Pure."""
 
 from collections.abc import Iterable, Sequence
 from datetime import UTC, datetime
@@ -9,7 +9,7 @@ from brachium_viewer.metrics.measure import Measure
 from brachium_viewer.metrics.medians import FEW, values
 from brachium_viewer.page_sections import PageTable
 from brachium_viewer.report import words
-from brachium_viewer.report.groups import Group, Past, Symmetry
+from brachium_viewer.report.groups import Group
 from brachium_viewer.report.withheld import LAST_BESIDE_FIRST
 from brachium_viewer.sessions.records import Rating
 
@@ -93,51 +93,6 @@ def within_session(groups: Sequence[Group]) -> PageTable | None:
     return PageTable(f"Last {FEW} repetitions beside the first {FEW}", head, rows, note)
 
 
-def comparison(groups: Sequence[Group], pasts: Sequence[Past | None]) -> PageTable | None:
-    """Return this session beside the last; a change only beyond the smallest detectable one."""
-    rows = []
-    for group, past in zip(groups, pasts, strict=True):
-        for name, change in past.changes.items() if past is not None else ():
-            smallest = change.smallest
-            source = f"{smallest.pairs} repeated donnings" if smallest.pairs else "stated"
-            rows.append(
-                [
-                    f"{words.movement(group.exercise.name, group.side, group.mode)}: {name}",
-                    f"{change.before:.0f}",
-                    f"{change.now:.0f}",
-                    f"{smallest.value_deg:.0f} ({source})",
-                    f"{change.difference:+.0f} deg" if change.detected else words.WITHIN_ERROR,
-                ]
-            )
-    if not rows:
-        return None
-    when = sorted({day(past.started_ns) for past in pasts if past is not None})
-    head = [f"deg; last session: {', '.join(when)}", "last", "now", "smallest detectable change", "change"]
-    return PageTable("Beside the last session", head, rows)
-
-
-def between_arms(symmetries: Sequence[Symmetry]) -> PageTable | None:
-    """Return one arm beside the other."""
-    rows = [
-        [
-            f"{words.movement(s.group.exercise.name, s.group.side, s.group.mode)} over {s.other.side}",
-            number(s.range_percent, 0),
-            number(s.jerk_percent, 0, signed=True),
-        ]
-        for s in symmetries
-    ]
-    note = "100 % of range: both arms alike. Difference of LDLJ over its mean: 0 % is alike."
-    head = ["", "range of motion, %", "difference of LDLJ, %"]
-    return PageTable("Both arms", head, rows, note) if rows else None
-
-
-def active_passive(lags: Sequence[tuple[Group, Measure]]) -> PageTable | None:
-    """Return by how much less far an arm goes by itself."""
-    rows = [[words.movement(g.exercise.name, g.side), number(lag, 0)] for g, lag in lags]
-    head = ["", "farther when moved, deg"]
-    return PageTable("Active against passive", head, rows) if rows else None
-
-
 def principal(found: Sequence[tuple[Group, Components | None]]) -> PageTable | None:
     """Return how much of the movement of all joint angles the first components explain."""
     rows = []
@@ -148,7 +103,7 @@ def principal(found: Sequence[tuple[Group, Components | None]]) -> PageTable | N
         rows.append(
             [
                 words.movement(group.exercise.name, group.side, group.mode),
-                *(f"{100 * share:.0f}" for share in [*parts.explained[:3], *[0.0] * 3][:3]),
+                *[*(f"{100 * share:.0f}" for share in parts.explained[:3]), NONE][:3],
                 ", ".join(
                     f"{name.replace('_', ' ')} {weight:+.2f}" for weight, name in first if abs(weight) >= 0.1
                 ),

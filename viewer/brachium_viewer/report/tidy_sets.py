@@ -76,7 +76,7 @@ def rows(
     found = [(group, row) for group in groups for row in _of_group(group)]
     for s in symmetries:
         found.append((s.group, Row("both_arms", "range", s.range_percent, s.other.side)))
-        found.append((s.group, Row("both_arms", "ldlj", s.jerk_percent, s.other.side)))
+        found.append((s.group, Row("both_arms", "ldlj", s.ldlj_change, s.other.side)))
     found += [(group, Row("active_passive", "peak", lag, "passive")) for group, lag in lags]
     return found + [(group, row) for group, some in parts for row in _of_parts(some)]
 

@@ -80,10 +80,10 @@ def _of_comparisons(
     parts: Sequence[tuple[Group, Components | None]],
 ) -> Iterator[Dash]:
     for s in symmetries:
-        if s.range_percent.withheld:
-            yield Dash(s.range_percent.withheld, "both arms: range of motion", _where(s.group))
-        if s.jerk_percent.withheld:
-            yield Dash(s.jerk_percent.withheld, "both arms: difference of LDLJ", _where(s.group))
+        if s.range_change.withheld:
+            yield Dash(s.range_change.withheld, "both arms: range of motion", _where(s.group))
+        if s.ldlj_change.withheld:
+            yield Dash(s.ldlj_change.withheld, "both arms: difference of LDLJ", _where(s.group))
     for group, lag in lags:
         if lag.withheld:
             yield Dash(lag.withheld, "farther when moved", words.movement(group.exercise.name, group.side))
