@@ -11,6 +11,7 @@ from brachium.__main__ import main
 from brachium_body.continuation import AngleTracker
 from brachium_nodes.wearer import Wearer, WearerSettings
 from brachium_viewer import marks
+from brachium_viewer.figures import figures
 from brachium_wire import keys, recording, table
 from brachium_wire.codec import encode
 from brachium_wire.messages import Skeleton
@@ -57,6 +58,8 @@ def test_by_when_each_came_all_is_as_if_no_clock_had_been_set(
     page, rows = report(right, tmp_path / "right")
     assert "jumped" not in page + caplog.text
     wrong = written(tmp_path / "wrong.mcap", skeletons, set_by_s)
+    assert "the clock of fusion jumped by" in figures(wrong).warning
+    assert figures(right).warning == ""
     for language, said in (("en", "the clock of fusion jumped by"), ("de", "die Uhr der Fusion sprang um")):
         page, found = report(wrong, tmp_path, "--language", language)
         assert page.count(said) == 1

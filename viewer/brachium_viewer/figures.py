@@ -106,7 +106,7 @@ def of_contents(contents: Contents, name: str) -> SummaryFigures:
         segments=segments(contents),
         arms={"/".join(who): _arm(arm) for who, arm in sorted(contents.arms.items()) if len(arm.published)},
         unreadable=contents.unreadable,
-        warning=contents.warning,
+        warning="; ".join(line for line in (contents.warning, *contents.clocks.values()) if line),
     )
 
 

@@ -133,6 +133,14 @@ def test_the_shoulder_is_the_shoulder_where_the_trunk_is_measured_beside_it() ->
         assert {together(order, CURL).shoulder_word for order in (both, both[::-1])} == {said}
 
 
+def test_a_shift_that_is_known_at_other_times_does_not_lack_its_sensors() -> None:
+    motion = recorded(EVERY)
+    motion.shoulder_shift_m[T > 1.0] = np.nan
+    assert set_measures(motion, CURL).medians["shoulder_shift"].withheld == "only 0 % of it was measured"
+    motion.shoulder_shift_m[:] = np.nan
+    assert "two sensors with raw samples" in set_measures(motion, CURL).medians["shoulder_shift"].withheld
+
+
 def test_a_shift_that_is_assumed_is_not_measured() -> None:
     assert set_measures(recorded(EVERY), CURL).medians["shoulder_shift"].value is not None
     assert set_measures(recorded(EVERY, shoulder="assumed"), CURL).medians["shoulder_shift"].value is None

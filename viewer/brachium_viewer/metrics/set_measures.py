@@ -107,6 +107,8 @@ def _seen(
     What was done meanwhile may have been its farthest point, or the end of it and the begin of another.
     """
     made = repetition_measures(motion, exercise, repetition, point, goal_deg)
+    if made.measures["shoulder_shift"].withheld == NO_SHIFT and np.isfinite(motion.shoulder_shift_m).any():
+        made.measures["shoulder_shift"] = measure(np.nan, "m", 0.0)  # its sensors are worn
     hole = _hole_of(repetition, holes)
     if hole is None:
         return made
