@@ -63,6 +63,23 @@ def angular_velocity(time_s: Floats, values: Floats, from_s: float, to_s: float)
     return np.empty(0)
 
 
+def coverage(time_s: Floats, known: npt.ArrayLike) -> float:
+    """Return the part of the rows (n,) that are measured, 0 to 1; none: 0.
+
+    A row between two known ones at most HOLD_S apart is: what is held for so long shows in one of them. So
+    packets lost one by one leave no hole in a movement.
+    """
+    seen = np.asarray(known, dtype=np.bool_)
+    if not seen.any():
+        return 0.0
+    t = time_s[seen]
+    after = np.searchsorted(t, time_s)
+    inner = (after > 0) & (after < len(t))
+    near = np.zeros_like(seen)
+    near[inner] = t[after[inner]] - t[after[inner] - 1] <= HOLD_S + 1e-9
+    return float((seen | near).mean())
+
+
 def longest_gap_s(time_s: Floats, known: npt.ArrayLike, from_s: float, to_s: float) -> float:
     """Return the longest time between `from_s` and `to_s` in which no known row (n,) lies."""
     seen = time_s[np.asarray(known, dtype=np.bool_)]

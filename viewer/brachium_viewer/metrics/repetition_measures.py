@@ -4,7 +4,6 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-import numpy.typing as npt
 
 from brachium_viewer.exercises import PLANE_FROM_DEG, PLANES_DEG, Exercise
 from brachium_viewer.metrics import kinematics
@@ -81,7 +80,7 @@ def count(motion: ArmMotion, exercise: Exercise) -> MovementSet:
 
 def point_of(motion: ArmMotion) -> Point:
     """Return whose path a whole set tells: the hand's, or the wrist's when that was measured for longer."""
-    hand, wrist = (_coverage(motion.measured(point)) for point in ("hand", "wrist"))
+    hand, wrist = (kinematics.coverage(motion.time_s, motion.measured(point)) for point in ("hand", "wrist"))
     return "wrist" if wrist > hand + NEARLY else "hand"
 
 
@@ -115,7 +114,7 @@ def repetition_measures(
 def _of_the_angle(part: ArmMotion, base: ArmMotion, exercise: Exercise) -> dict[str, Measure]:
     sign = 1.0 if exercise.rises else -1.0
     angle = rising(part, exercise)
-    coverage = _coverage(np.isfinite(angle))
+    coverage = kinematics.coverage(part.time_s, np.isfinite(angle))
     _, high = kinematics.extremes(part.time_s, angle)
     low, _ = kinematics.extremes(base.time_s, rising(base, exercise))
     reason = _off_plane(part, exercise) or (
@@ -160,7 +159,8 @@ def _of_the_way(around: ArmMotion, way: Way | None, exercise: Exercise) -> dict[
     if way is None or not len(velocity):
         return {name: withheld(NO_WAY, NAMES[name]) for name in names}
     known = np.isfinite(angle)
-    coverage = _coverage(known[(times >= way.from_s) & (times <= way.to_s)])
+    there = (times >= way.from_s) & (times <= way.to_s)
+    coverage = kinematics.coverage(times[there], known[there])
     seconds, speed = way.to_s - way.from_s, np.abs(velocity)
     numbers = (
         seconds,
@@ -200,7 +200,8 @@ def _of_the_path(around: ArmMotion, way: Way | None, point: Point) -> dict[str, 
     known = there.measured(point)
     found = kinematics.path(there.time_s, np.where(known[:, None], there.positions_m[point], np.nan))
     pairs = zip(OF_THE_POINT, found, strict=True)
-    return {name: measure(value, NAMES[name], _coverage(known)) for name, value in pairs}
+    coverage = kinematics.coverage(there.time_s, known)
+    return {name: measure(value, NAMES[name], coverage) for name, value in pairs}
 
 
 def _of_the_trunk(part: ArmMotion) -> dict[str, Measure]:
@@ -210,7 +211,9 @@ def _of_the_trunk(part: ArmMotion) -> dict[str, Measure]:
     lean, lean_seen = _lean(part)
     return {
         "shoulder_shift": (
-            measure(float(moved), "m", _coverage(known)) if known.any() else withheld(NO_SHIFT, "m")
+            measure(float(moved), "m", kinematics.coverage(part.time_s, known))
+            if known.any()
+            else withheld(NO_SHIFT, "m")
         ),
         "trunk_lean": (measure(lean, "deg", lean_seen) if part.with_sternum else withheld(NO_STERNUM, "deg")),
     }
@@ -224,9 +227,5 @@ def _lean(part: ArmMotion) -> tuple[float, float]:
     known = np.isfinite(pair).all(axis=1)
     if not known.any():
         return np.nan, 0.0
-    return float(np.linalg.norm(pair[known] - pair[known][0], axis=1).max()), _coverage(known)
-
-
-def _coverage(known: npt.ArrayLike) -> float:
-    array = np.asarray(known, dtype=np.bool_)
-    return float(array.mean()) if array.size else 0.0
+    leaned = float(np.linalg.norm(pair[known] - pair[known][0], axis=1).max())
+    return leaned, kinematics.coverage(part.time_s, known)

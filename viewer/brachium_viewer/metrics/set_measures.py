@@ -192,7 +192,7 @@ def _why_none(motion: ArmMotion, exercise: Exercise) -> dict[str, str]:
 
 def _deficit(motion: ArmMotion) -> Measure:
     known = motion.known("elbow_flexion")
-    coverage = float(np.isfinite(known).mean()) if len(known) else 0.0
+    coverage = kinematics.coverage(motion.time_s, np.isfinite(known))
     low, _ = kinematics.extremes(motion.time_s, known)
     return measure(max(0.0, low) if np.isfinite(low) else np.nan, "deg", coverage)
 
