@@ -6,6 +6,7 @@ import numpy as np
 
 from brachium_body.angles import CLINICAL
 from brachium_viewer.metrics.arm_motion import ArmMotion, Floats
+from brachium_viewer.metrics.kinematics import coverage
 from brachium_viewer.metrics.measure import ENOUGH, Measure, measure, withheld
 
 
@@ -47,7 +48,7 @@ class Components:
 def components(motion: ArmMotion) -> Components | None:
     """Return the principal components, or None when fewer than two angles were measured or nothing moved."""
     columns = {name: motion.known(name) for name in CLINICAL}
-    names = tuple(n for n, v in columns.items() if len(v) and np.isfinite(v).mean() >= ENOUGH)
+    names = tuple(n for n, v in columns.items() if coverage(motion.time_s, np.isfinite(v)) >= ENOUGH)
     if len(names) < 2:
         return None
     table = np.stack([columns[name] for name in names], axis=1)

@@ -89,7 +89,7 @@ def set_measures(
         first_to_last=first_to_last(found),
         extension_deficit=_deficit(motion),
         shoulder_word=_shoulder_word(motion, found),
-        measured=float(motion.measured(exercise.angle).mean()) if len(motion.time_s) else 0.0,
+        measured=kinematics.coverage(motion.time_s, motion.measured(exercise.angle)),
         path_of=point,
     )
 
@@ -184,7 +184,7 @@ def _why_none(motion: ArmMotion, exercise: Exercise) -> dict[str, str]:
     """Return by NAMES why a set without repetitions has none: its angle was not measured, or nobody moved so;
     what comes from elsewhere may not have been worn."""
     why = NO_REPETITION
-    if len(motion.time_s) and float(motion.measured(exercise.angle).mean()) < ENOUGH:
+    if len(motion.time_s) and kinematics.coverage(motion.time_s, motion.measured(exercise.angle)) < ENOUGH:
         why = why_not(motion.quality[exercise.angle])
     found = {**dict.fromkeys(NAMES, why), **dict.fromkeys(OF_PLACES, NO_REPETITION)}
     return found if motion.with_sternum else {**found, "trunk_lean": NO_STERNUM}
