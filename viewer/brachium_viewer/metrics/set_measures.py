@@ -193,6 +193,9 @@ def _why_none(motion: ArmMotion, exercise: Exercise) -> dict[str, str]:
 def _deficit(motion: ArmMotion) -> Measure:
     known = motion.known("elbow_flexion")
     coverage = kinematics.coverage(motion.time_s, np.isfinite(known))
+    why = why_not(motion.quality["elbow_flexion"])
+    if coverage < ENOUGH and why:
+        return withheld(why, "deg", coverage)
     low, _ = kinematics.extremes(motion.time_s, known)
     return measure(max(0.0, low) if np.isfinite(low) else np.nan, "deg", coverage)
 
