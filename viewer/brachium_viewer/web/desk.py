@@ -84,6 +84,8 @@ class Desk:
             case r.Exercise():
                 async with self._recording:
                     return await self._begin(subject, asked)
+            case r.Plan():
+                return self._plan(subject, asked)
             case r.Stop():
                 ended = await self._end(subject, "stopped")
                 if not await self._sessions.reached(self._bus):
@@ -137,23 +139,16 @@ class Desk:
             raise Refused(answer.reason)
         return answer.data
 
+    def _plan(self, subject: str, asked: r.Plan) -> Json:
+        self._state.plans.mean(subject, _begins(asked))
+        return {}
+
     async def _begin(self, subject: str, asked: r.Exercise) -> Json:
         if asked.side not in self._state.sides():
             raise Refused(f"no skeletons of the {asked.side} arm come: are its sensors on?")
         if self._state.running is not None:
             raise Refused("a set is running: stop it first")
-        if _leads_beyond(asked):
-            raise Refused("the goal lies beyond the limit: change one of them")
-        begins = marks.ExerciseBegins(
-            exercise=asked.exercise,
-            side=asked.side,
-            mode=asked.mode,
-            goal_deg=asked.goal_deg,
-            limit_deg=asked.limit_deg,
-            set=asked.set,
-            sets=asked.sets,
-            repetitions=asked.repetitions,
-        )
+        begins = _begins(asked)
         await self._sessions.begin(self._bus, subject, anew=True, language=asked.language)
         now_ns = self._instant_ns()
         self._state.begin(begins, now_ns)
@@ -204,6 +199,7 @@ class Desk:
                 await asyncio.wait(self._owed, timeout=OWED_S)
             await asyncio.sleep(HEARD_S)  # what was said last is still on its way to the recording
             closed = await self._sessions.end()
+            self._state.plans.over(subject)
         return await self._sessions.keep(closed, subject, language)
 
     async def _mark(self, subject: str, mark: marks.Mark, text: str = "") -> Json:
@@ -230,12 +226,14 @@ class Desk:
             raise Refused(f"the answer cannot be read: {error}") from None
 
 
-def _leads_beyond(asked: r.Exercise) -> bool:
-    """Return whether who follows the goal would pass the limit."""
-    if asked.goal_deg is None or asked.limit_deg is None:
-        return False
+def _begins(asked: r.Plan) -> marks.ExerciseBegins:
+    """Return what is meant. Raises Refused where who follows the goal would pass the limit."""
     rises = exercise(asked.exercise).rises
-    return asked.goal_deg > asked.limit_deg if rises else asked.goal_deg < asked.limit_deg
+    if asked.goal_deg is not None and asked.limit_deg is not None:
+        over = asked.goal_deg - asked.limit_deg
+        if (over if rises else -over) > 0:
+            raise Refused("the goal lies beyond the limit: change one of them")
+    return asked.begins()
 
 
 def _answer(number: int, verb: str, *, data: Json | None = None, reason: str = "") -> Json:

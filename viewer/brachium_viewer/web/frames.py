@@ -113,18 +113,20 @@ def session(told: Session | None) -> Json | None:
 def running(begins: ExerciseBegins, from_ns: int) -> Json:
     """Return what the running set is."""
     row = EXERCISES.get(begins.exercise, EXERCISES["free"])
+    return {"angle": row.angle, "rises": row.rises, "from": from_ns / 1e6, **plan(begins)}
+
+
+def plan(meant: ExerciseBegins) -> Json:
+    """Return what is to be done, or is."""
     return {
-        "exercise": begins.exercise,
-        "angle": row.angle,
-        "rises": row.rises,
-        "side": begins.side,
-        "mode": begins.mode,
-        "goal_deg": begins.goal_deg,
-        "limit_deg": begins.limit_deg,
-        "set": begins.set,
-        "sets": begins.sets,
-        "repetitions": begins.repetitions,
-        "from": from_ns / 1e6,
+        "exercise": meant.exercise,
+        "side": meant.side,
+        "mode": meant.mode,
+        "goal_deg": meant.goal_deg,
+        "limit_deg": meant.limit_deg,
+        "set": meant.set,
+        "sets": meant.sets,
+        "repetitions": meant.repetitions,
     }
 
 

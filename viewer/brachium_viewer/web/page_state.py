@@ -9,6 +9,7 @@ from brachium_viewer.health import Network
 from brachium_viewer.marks import ExerciseBegins
 from brachium_viewer.web import frames
 from brachium_viewer.web.frames import Json
+from brachium_viewer.web.plans import Plans
 from brachium_viewer.web.running_set import RunningSet
 from brachium_viewer.window import limit_s
 from brachium_wire import keys
@@ -44,6 +45,7 @@ class PageState:
     def __init__(self, room: str, subject: str | None = None) -> None:
         self.room, self.subject = room, subject
         self.network = Network()
+        self.plans = Plans()
         self.running: RunningSet | None = None
         self.stopped: str | None = None
         """Why the patient stopped; until a set begins or somebody else is shown."""
@@ -101,11 +103,15 @@ class PageState:
         if self.running is not None:
             raise ValueError("a set is running: stop it first")
         self.running, self._progress, self.stopped = RunningSet(begins, from_ns), None, None
+        self.plans.begun(self.subject, begins)
 
     def end(self) -> Json | None:
         """Count no more; return where the set stood, or None when none ran."""
         ended, self.running = self.running, None
-        return None if ended is None else frames.progress(ended.progress())
+        if ended is None or self.subject is None:
+            return None
+        self.plans.ended(self.subject, ended.begins)
+        return frames.progress(ended.progress())
 
     def known(self, subject: str) -> bool:
         """Return whether anything was heard of a subject."""
@@ -166,6 +172,7 @@ class PageState:
             "calibration": frames.calibration(subject.calibration),
             "session": frames.session(subject.session),
             "stopped": self.stopped,
+            "plans": [frames.plan(one) for one in self.plans.of(self.subject)],
             "set": None if running is None else frames.running(running.begins, running.from_ns),
         }
 

@@ -6,7 +6,7 @@ import msgspec
 
 from brachium_body.segments import Side
 from brachium_viewer.catalogue import ENGLISH
-from brachium_viewer.marks import Mode, When
+from brachium_viewer.marks import ExerciseBegins, Mode, When
 
 MAX_BYTES = 4096
 """A request is a few words."""
@@ -49,8 +49,8 @@ class WearCheck(Request, frozen=True, kw_only=True, tag="wear-check"):
     """Find which sensor sits where."""
 
 
-class Exercise(Request, frozen=True, kw_only=True, tag="exercise"):
-    """Begin a set."""
+class Plan(Request, frozen=True, kw_only=True, tag="plan"):
+    """Say what is to be done next, to every screen."""
 
     exercise: Annotated[str, msgspec.Meta(min_length=1, max_length=64)]
     side: Side
@@ -60,6 +60,23 @@ class Exercise(Request, frozen=True, kw_only=True, tag="exercise"):
     set: Count = 1
     sets: Count = 1
     repetitions: Count | None = None
+
+    def begins(self) -> ExerciseBegins:
+        """Return the mark of the set that is meant."""
+        return ExerciseBegins(
+            exercise=self.exercise,
+            side=self.side,
+            mode=self.mode,
+            goal_deg=self.goal_deg,
+            limit_deg=self.limit_deg,
+            set=self.set,
+            sets=self.sets,
+            repetitions=self.repetitions,
+        )
+
+
+class Exercise(Plan, frozen=True, kw_only=True, tag="exercise"):
+    """Begin a set."""
 
 
 class Stop(Request, frozen=True, kw_only=True, tag="stop"):
@@ -113,6 +130,7 @@ Any = (
     Calibrate
     | Zero
     | WearCheck
+    | Plan
     | Exercise
     | Stop
     | PatientStop

@@ -3,7 +3,7 @@
 import { Calibration } from "./calibration.js";
 import { Link } from "./link.js";
 import { Numbers } from "./numbers.js";
-import { $, busy, make, renew, tell } from "./page.js";
+import { $, busy, make, put, renew, tell } from "./page.js";
 import { People } from "./people.js";
 import { Picture } from "./picture.js";
 import { Plan } from "./plan.js";
@@ -14,8 +14,9 @@ import { switchTheme } from "./theme.js";
 import { sounds, switchSound } from "./tone.js";
 import { language, say, sayCount, speak, told } from "./words.js";
 
+const UNCOUNTED = new Set(["uncalibrated", "heading_assumed", "assumed"]);
+
 let state = null;
-let set = 1;
 let up = false;
 let again = false; // the next state is the first that this line tells
 let next = null; // the button that gets the focus as soon as it is there
@@ -24,8 +25,8 @@ await speak();
 const picture = new Picture($("picture"));
 const numbers = new Numbers();
 const tabs = new Tabs($("tabs"));
-const plan = new Plan(() => meant());
 const link = new Link({ hello, frame, state: news, line });
+const plan = new Plan(() => meant(), link);
 const calibration = new Calibration(link);
 const people = new People(link);
 showRatings(link);
@@ -48,6 +49,7 @@ function frame(message) {
   showParts(message.arms);
   numbers.frame(message);
   picture.show(message.arms, message.set?.over ? numbers.side : null);
+  hint();
 }
 
 /** What the numbers are about: the set that runs, else what is chosen. */
@@ -59,16 +61,25 @@ function meant() {
   numbers.mean({ row, side: words.side, goal: words.goal_deg, limit: words.limit_deg });
   const wanted = running ? running.repetitions : words.repetitions;
   $("count-wanted").textContent = wanted == null ? "" : say("of", { wanted });
-  $("count-set").textContent = say("set", { set: running?.set ?? numbers.ended?.number ?? set, sets: words.sets });
-  $("start").textContent = words.sets > 1 ? say("start.set", { set, sets: words.sets }) : say("start");
+  $("count-set").textContent = say("set", { set: running?.set ?? numbers.ended?.number ?? plan.number, sets: words.sets });
+  const { sets } = plan.words;
+  $("start").textContent = sets > 1 ? say("start.set", { set: plan.number, sets }) : say("start");
+}
+
+/** Beside the button, before anybody waits for a count: that this angle is not measured, so nothing is counted. */
+function hint() {
+  const { quality } = numbers;
+  const words = UNCOUNTED.has(quality) ? say(`uncounted.${quality}`) : "";
+  $("action-hint").hidden = !words;
+  put($("action-hint"), words);
 }
 
 function news(message) {
   if (state && state.subject !== message.subject) {
-    set = 1;
     numbers.ended = null;
     clearRatings();
   }
+  if (!state && (message.set || message.recording.state === "on")) tabs.show($("tab-exercise"));
   if (again && state?.set && !message.set) tell($("action-said"), { ok: false, reason: say("line.anew") });
   again = false;
   state = message;
@@ -77,6 +88,7 @@ function news(message) {
   people.show(state);
   calibration.show(state.calibration);
   plan.sides(state.sides.length ? state.sides : ["right"], state.session?.side);
+  plan.adopt(state);
   $("origin").hidden = state.origin === "worn";
   $("origin").textContent = say(`origin.${state.origin}`);
   $("start").hidden = state.set !== null;
@@ -126,7 +138,7 @@ function history() {
 
 $("start").addEventListener("click", async () => {
   tabs.show($("tab-exercise"));
-  const answer = await busy($("start"), () => link.ask("exercise", { ...plan.words, set }));
+  const answer = await busy($("start"), () => link.ask("exercise", { ...plan.words, set: plan.number }));
   numbers.ended = null;
   tell($("action-said"), answer);
   if (!answer.ok) return;
@@ -135,11 +147,11 @@ $("start").addEventListener("click", async () => {
 });
 
 $("stop").addEventListener("click", async () => {
+  const { set, sets } = state.set ?? { set: plan.number, sets: plan.words.sets };
   const answer = await busy($("stop"), () => link.ask("stop"));
   if (answer.ok) numbers.ended = { ...answer.data.set, number: set };
-  const last = set >= plan.words.sets;
+  const last = set >= sets;
   tell($("action-said"), answer, sayCount("set.done", answer.data?.set?.count ?? 0));
-  if (answer.ok) set = last ? 1 : set + 1;
   if (answer.ok) lead($("start"));
   if (answer.ok && last) tabs.show($("tab-finish"));
   meant();
@@ -156,7 +168,6 @@ $("report").addEventListener("click", async () => {
   const notes = [answer.data?.ended, answer.data?.why].filter(Boolean).map(told).join(" ");
   tell($("report-said"), answer, `${say("report.done", { file: answer.data?.recording ?? "" })} ${notes}`);
   if (!answer.ok) return;
-  set = 1;
   clearRatings();
   $("report-open").hidden = !answer.data.report;
   if (answer.data.report) {

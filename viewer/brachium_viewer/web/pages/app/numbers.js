@@ -38,6 +38,7 @@ export class Numbers {
     const arm = frame.arms[this.side];
     const [value, quality] = arm?.angles[this.angle] ?? [null, "missing"];
     const measured = MEASURED.has(quality) && value != null;
+    this.quality = quality;
     put($("angle-value"), degrees(value));
     $("angle-value").parentElement.classList.toggle("doubtful", !measured);
     $("angle-quality").hidden = measured;

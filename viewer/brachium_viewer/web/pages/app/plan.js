@@ -1,9 +1,12 @@
-// What is to be done: exercise, arm, how it is moved, goal, sets, repetitions, limit.
+// What is to be done: exercise, arm, how it is moved, goal, sets, repetitions, limit. The same on every screen: the
+// server keeps what was chosen, and a page that is loaded anew or joins takes it from there.
 
 import { $, make, renew } from "./page.js";
-import { fill, has, say } from "./words.js";
+import { Stepper } from "./stepper.js";
+import { fill, has, number, say } from "./words.js";
 
 const MODES = ["active", "assisted", "passive"];
+const SPARE_DEG = 5; // between goal and limit: the alarm is not where the goal is
 const STEPS = [
   { name: "sets", value: 3, min: 1, max: 20, step: 1 },
   { name: "repetitions", value: 10, min: 1, max: 100, step: 1 },
@@ -17,68 +20,25 @@ function choice(name, value, key, checked) {
   return make("label", {}, input, make("span", { "data-say": key }));
 }
 
-class Stepper {
-  constructor({ name, value, min, max, step, optional, on }, changed) {
-    this.changed = changed;
-    this.step = step;
-    this.input = make("input", { id: `plan-${name}`, type: "number", inputmode: "numeric", min, max, step });
-    this.input.value = value;
-    this.less = make("button", { type: "button", "data-say-label": `${name}.less` }, "−");
-    this.more = make("button", { type: "button", "data-say-label": `${name}.more` }, "+");
-    this.less.addEventListener("click", () => this.move(-1));
-    this.more.addEventListener("click", () => this.move(1));
-    this.input.addEventListener("change", () => this.changed());
-    const label = make("label", { for: `plan-${name}`, "data-say": name });
-    const head = make("div", { class: "with-check" }, label);
-    if (optional) {
-      this.check = make("input", { id: `use-${name}`, type: "checkbox", "data-say-label": `${name}.use` });
-      this.check.checked = on;
-      this.check.addEventListener("change", () => this.used());
-      head.prepend(this.check);
-    }
-    this.field = make("div", { class: "field" }, head, make("div", { class: "stepper" }, this.less, this.input, this.more));
-    this.used();
-  }
-
-  used() {
-    for (const one of [this.input, this.less, this.more]) one.disabled = this.off;
-    this.changed();
-  }
-
-  get off() {
-    return this.check ? !this.check.checked : false;
-  }
-
-  move(by) {
-    const [low, high] = [Number(this.input.min), Number(this.input.max)];
-    this.input.value = Math.min(high, Math.max(low, Number(this.input.value) + by * this.step));
-    this.changed();
-  }
-
-  get value() {
-    return this.off || this.input.value === "" || !this.input.checkValidity() ? null : Number(this.input.value);
-  }
-
-  set value(value) {
-    if (value != null) this.input.value = value;
-    if (this.check) this.check.checked = value != null;
-    this.used();
-  }
-}
-
 export class Plan {
-  /** `changed` is called whenever something else is chosen. */
-  constructor(changed) {
+  /** `changed` is called whenever something else is chosen; `link` tells it to the other screens. */
+  constructor(changed, link) {
+    this.link = link;
+    this.plans = []; // that the server keeps, the one meant last at the end
+    this.mine = new Map(); // by subject, what was meant last: a server that starts anew has forgotten it
     this.changed = () => {
-      if (!this.ready) return;
+      if (!this.ready || this.filling) return;
       this.within();
       changed();
+      this.tell();
     };
+    this.filled = changed;
     this.steps = Object.fromEntries(STEPS.map((row) => [row.name, new Stepper(row, () => this.changed())]));
     $("numbers").replaceChildren(...STEPS.map((row) => this.steps[row.name].field));
     $("modes").replaceChildren(...MODES.map((mode) => choice("mode", mode, `mode.${mode}`, mode === "active")));
     $("which").addEventListener("change", () => this.chosen());
-    for (const id of ["sides", "modes"]) $(id).addEventListener("change", () => this.changed());
+    $("sides").addEventListener("change", () => this.otherSide());
+    $("modes").addEventListener("change", () => this.changed());
     document.addEventListener("language", () => this.names());
   }
 
@@ -89,7 +49,7 @@ export class Plan {
     if (this.exercises.has(before)) $("which").value = before;
     this.names();
     this.ready = true;
-    if (!before) this.chosen();
+    if (!before) this.fill(this.fresh);
   }
 
   names() {
@@ -98,19 +58,109 @@ export class Plan {
     fill($("exercise"));
   }
 
+  /** What is proposed to somebody of whom nothing is known. */
+  get fresh() {
+    const values = Object.fromEntries(STEPS.map(({ name, value, on }) => [name, on === false ? null : value]));
+    const { name, goal_deg } = this.exercises.values().next().value;
+    const { sets, repetitions } = values;
+    return { exercise: name, side: null, mode: "active", goal_deg, limit_deg: values.limit, sets, repetitions };
+  }
+
+  /** Another exercise: as it was meant before, else with its own goal; a limit stays until somebody takes it away. */
   chosen() {
-    const row = this.exercise;
-    this.steps.goal.value = row.goal_deg;
-    this.names();
+    const known = this.known;
+    if (known) this.fill(known);
+    else this.fill({ ...this.words, goal_deg: this.exercise.goal_deg });
     this.changed();
   }
 
-  /** A goal never leads beyond the limit. */
+  otherSide() {
+    this.wanted = this.side;
+    if (this.known) this.fill(this.known);
+    this.changed();
+  }
+
+  /** Put a plan into the form. */
+  fill(row) {
+    this.filling = true;
+    if (this.exercises.has(row.exercise)) $("which").value = row.exercise;
+    if (row.side) this.wanted = row.side;
+    for (const [name, value] of [["side", row.side], ["mode", row.mode]]) {
+      for (const input of document.querySelectorAll(`input[name="${name}"]`)) input.checked ||= input.value === value;
+    }
+    const { goal, limit, sets, repetitions } = this.steps;
+    goal.value = row.goal_deg;
+    limit.value = row.limit_deg;
+    sets.value = row.sets;
+    if (row.repetitions != null) repetitions.value = row.repetitions;
+    this.filling = false;
+    this.names();
+    this.within();
+    this.filled();
+  }
+
+  /** Take the plans that all screens share; what was chosen here and could not be told yet comes first. */
+  adopt({ subject, plans }) {
+    if (!this.ready || subject === null) return;
+    const other = this.subject && this.subject !== subject;
+    if (other) this.untold = false;
+    const unknown = this.mine.get(subject) ?? (this.subject ? null : this.mine.get(undefined));
+    this.subject = subject;
+    this.plans = plans;
+    if (this.untold) this.tell();
+    if (this.telling) return;
+    const newest = plans.at(-1);
+    const key = JSON.stringify([subject, newest]);
+    if (key === this.adopted) return;
+    this.adopted = key;
+    if (newest) {
+      this.mine.set(subject, newest);
+      this.fill(newest);
+    } else if (unknown) {
+      this.fill(unknown);
+      this.tell();
+    } else if (other) {
+      this.fill(this.fresh);
+    }
+  }
+
+  /** Tell what is chosen to every screen; while the line is cut, as soon as it is back. */
+  async tell() {
+    this.untold = true;
+    this.mine.set(this.subject, { ...this.words, set: this.number });
+    if (this.telling) return;
+    this.telling = true;
+    while (this.untold) {
+      this.untold = false;
+      const { ok, reason } = await this.link.ask("plan", { ...this.words, set: this.number });
+      if (ok || reason) continue;
+      this.untold = true;
+      break;
+    }
+    this.telling = false;
+  }
+
+  /** What was meant before with this exercise and arm. */
+  get known() {
+    const rows = [...this.plans, this.mine.get(this.subject)];
+    return rows.find((row) => row?.exercise === $("which").value && row.side === this.side);
+  }
+
+  /** Which set is next. */
+  get number() {
+    const number = this.known?.set ?? 1;
+    return number <= this.steps.sets.value ? number : 1;
+  }
+
+  /** A goal is some degrees before the limit: who follows it does not hear the alarm. */
   within() {
     const { goal, limit } = this.steps;
+    $("plan-said").textContent = "";
     if (goal.value === null || limit.value === null) return;
-    const beyond = this.exercise.rises ? goal.value > limit.value : goal.value < limit.value;
-    if (beyond) goal.input.value = limit.value;
+    const nearest = limit.value - (this.exercise.rises ? SPARE_DEG : -SPARE_DEG);
+    if (this.exercise.rises ? goal.value <= nearest : goal.value >= nearest) return;
+    goal.number = nearest;
+    $("plan-said").textContent = say("goal.moved", { goal: number(goal.value), spare: number(SPARE_DEG) });
   }
 
   get exercise() {
@@ -119,7 +169,7 @@ export class Plan {
 
   sides(sides, affected) {
     renew($("sides"), sides.join(), () => {
-      const before = this.side;
+      const before = this.wanted ?? this.side;
       const wanted = sides.includes(before) ? before : sides.includes(affected) ? affected : sides[0];
       return sides.map((side) => choice("side", side, `side.${side}`, side === wanted));
     });
@@ -138,7 +188,7 @@ export class Plan {
       mode: document.querySelector('input[name="mode"]:checked').value,
       goal_deg: this.steps.goal.value,
       limit_deg: this.steps.limit.value,
-      sets: this.steps.sets.value ?? 1,
+      sets: this.steps.sets.value,
       repetitions: this.steps.repetitions.value,
     };
   }

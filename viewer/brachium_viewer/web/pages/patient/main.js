@@ -4,7 +4,7 @@ import "../app/theme.js";
 import { Link } from "../app/link.js";
 import { counted, sounds, switchSound, warn } from "../app/tone.js";
 import { say, speak } from "../app/words.js";
-import { missing, led, after, nextSet, offered } from "./steps.js";
+import { missing, led, after, nextSet, offered, planned } from "./steps.js";
 import { armMoves, showSettings } from "./settings.js";
 import { Screens } from "./screens.js";
 import { named } from "./pictures.js";
@@ -18,7 +18,6 @@ const mine = {
   aside: false, // at the settings; the step waits
   side: null,
   exercise: 0,
-  sets: {}, // how many of each exercise were begun from here
   last: null, // the set that ran last
   over: null, // when it began: it is done, even if the server still tells of it
   pain: null,
@@ -71,12 +70,8 @@ async function stand() {
 }
 
 async function begin(set) {
-  const number = (mine.sets[set.exercise] ?? 0) + 1;
-  const wanted = { mode: "active", sets: Math.max(set.sets ?? 1, set.set ?? 1), set: number, ...set };
-  for (const name of ["goal_deg", "limit_deg", "repetitions"]) wanted[name] ??= null;
-  const { exercise, mode, sets, goal_deg, limit_deg, repetitions } = wanted;
-  const words = { exercise, side: set.side ?? side(), mode, goal_deg, limit_deg, repetitions, set: wanted.set };
-  if (await asked("exercise", { ...words, sets: Math.max(sets, wanted.set) })) mine.sets[exercise] = number;
+  const { exercise, mode, goal_deg, limit_deg, repetitions } = set;
+  await asked("exercise", { exercise, side: set.side, mode, goal_deg, limit_deg, repetitions, set: set.set, sets: set.sets });
 }
 
 async function finish() {
@@ -95,7 +90,7 @@ const GO = {
   still: () => (screens.calibrated() && !mine.refused ? enter(after("still", room.state.sides)) : stand()),
   exercise: () => {
     const one = choices()[mine.exercise % choices().length];
-    begin({ exercise: one.name, goal_deg: one.goal_deg });
+    begin(planned(room.state?.plans, one, side()));
   },
   do: finish,
   pain: rate,

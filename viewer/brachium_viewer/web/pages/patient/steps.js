@@ -38,6 +38,12 @@ export function far(angle, from, goal) {
   return Math.min(1, Math.max(0, (angle - from) / (goal - from)));
 }
 
+/** An exercise as it was planned for this arm, with its limit; else just the exercise. */
+export function planned(plans, { name, goal_deg }, side) {
+  const alone = { exercise: name, side, mode: "active", goal_deg, limit_deg: null, repetitions: null, set: 1, sets: 1 };
+  return plans?.find((one) => one.exercise === name && one.side === side) ?? alone;
+}
+
 /** The set after this one, or null when as many were done as were wanted. */
 export function nextSet(set) {
   return set && set.set < set.sets ? { ...set, set: set.set + 1 } : null;
