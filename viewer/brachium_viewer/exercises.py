@@ -30,6 +30,8 @@ class Exercise:
     single: bool = True
     """Whether one rise and fall of its angle is all of a repetition. False: it rises on the way as well, so
     that a smaller rise says nothing of what a person tried."""
+    straightens: bool = False
+    """Whether the elbow is to be straightened: only then is what it lacks a deficit."""
     plane: Plane | None = None
     """Of an elevation: its repetitions count in this band only."""
     goal_deg: float | None = None
@@ -45,6 +47,7 @@ EXERCISES: Mapping[str, Exercise] = {
             name="elbow-flexion",
             angle="elbow_flexion",
             goal_deg=120.0,
+            straightens=True,
             text="Bend the elbow, and straighten it again.",
         ),
         Exercise(
@@ -52,6 +55,7 @@ EXERCISES: Mapping[str, Exercise] = {
             angle="elbow_flexion",
             rises=False,
             goal_deg=10.0,
+            straightens=True,
             text="Straighten the elbow as far as it goes, and bend it again.",
         ),
         Exercise(

@@ -94,6 +94,16 @@ def test_what_is_assumed_or_lost_is_withheld_with_its_reason(motion_of) -> None:
     assert deficit.withheld
 
 
+def test_only_who_was_asked_to_straighten_the_elbow_lacks_something(motion_of) -> None:
+    motion: ArmMotion = motion_of(TIME, {"elbow_flexion": reaches([80.0] * 3)})
+    for name, exercise in EXERCISES.items():
+        deficit = set_measures(motion, exercise).extension_deficit
+        if name in ("elbow-flexion", "elbow-extension"):
+            assert deficit.value is not None
+        else:
+            assert deficit.withheld == "nobody was asked to straighten the elbow"
+
+
 def test_half_a_repetition_unseen_is_withheld(motion_of) -> None:
     motion = motion_of(TIME, {"elbow_flexion": reaches([80.0] * 3, hold_s=2.0)})
     motion.quality["elbow_flexion"][(TIME > 6.8) & (TIME < 9.0)] = "missing"

@@ -87,7 +87,7 @@ def set_measures(
         medians=medians(found, none),
         best_peak=best(found, none, rises=exercise.rises),
         first_to_last=first_to_last(found),
-        extension_deficit=_deficit(motion),
+        extension_deficit=_deficit(motion, exercise),
         shoulder_word=_shoulder_word(motion, found),
         measured=kinematics.coverage(motion.time_s, motion.measured(exercise.angle)),
         path_of=point,
@@ -190,7 +190,9 @@ def _why_none(motion: ArmMotion, exercise: Exercise) -> dict[str, str]:
     return found if motion.with_sternum else {**found, "trunk_lean": NO_STERNUM}
 
 
-def _deficit(motion: ArmMotion) -> Measure:
+def _deficit(motion: ArmMotion, exercise: Exercise) -> Measure:
+    if not exercise.straightens:
+        return withheld("nobody was asked to straighten the elbow", "deg")
     known = motion.known("elbow_flexion")
     coverage = kinematics.coverage(motion.time_s, np.isfinite(known))
     why = why_not(motion.quality["elbow_flexion"])

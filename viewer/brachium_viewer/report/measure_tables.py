@@ -29,7 +29,7 @@ Column = tuple[str, Callable[[Group], str]]
 def measures(groups: Sequence[Group]) -> list[PageTable]:
     """Return the medians of the repetitions: a row a group."""
     far = [_measure(name, groups) for name in HOW_FAR]
-    if any(g.exercise.angle == "elbow_flexion" for g in groups):
+    if any(g.exercise.straightens for g in groups):
         far.append((_head("short of straight", "deg"), _deficit))
     far.append((_head("measured", "%"), _measured))
     went = [_measure(name, groups) for name in HOW_IT_WENT]
@@ -70,7 +70,7 @@ def _head(label: str, unit: str) -> str:
 
 
 def _deficit(group: Group) -> str:
-    return number(group.pooled.extension_deficit, 0) if group.exercise.angle == "elbow_flexion" else ""
+    return number(group.pooled.extension_deficit, 0) if group.exercise.straightens else ""
 
 
 def _measured(group: Group) -> str:

@@ -87,7 +87,7 @@ def _of_group(group: Group) -> Iterator[Row]:
     yield Row("set", "repetitions", _count(len(pooled.repetitions), share))
     yield Row("set", "tries", _count(pooled.tries, share))
     yield Row("set", "best_peak", pooled.best_peak)
-    if group.exercise.angle == "elbow_flexion":
+    if group.exercise.straightens:
         yield Row("set", "extension_deficit", pooled.extension_deficit)
     of = {"shoulder_shift": pooled.shoulder_word, "hand_path": pooled.path_of, "straightness": pooled.path_of}
     for name, median in pooled.medians.items():

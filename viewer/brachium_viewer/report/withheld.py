@@ -64,7 +64,7 @@ def _of_groups(groups: Sequence[Group]) -> Iterator[Dash]:
                 yield Dash(why, words.label(name, pooled.path_of), where)
         if pooled.best_peak.withheld:
             yield Dash(pooled.best_peak.withheld, "farthest of all", where)
-        if g.exercise.angle == "elbow_flexion" and pooled.extension_deficit.withheld:
+        if g.exercise.straightens and pooled.extension_deficit.withheld:
             yield Dash(pooled.extension_deficit.withheld, "short of straight", where)
         changes = {name: pooled.first_to_last[name] for name in LAST_BESIDE_FIRST}
         if any(one.value is not None for one in changes.values()):  # else there is no row of it
