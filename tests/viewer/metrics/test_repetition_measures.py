@@ -81,6 +81,18 @@ def test_an_elevation_counts_in_its_plane_only(
     assert ("plane" in peak.withheld) == is_withheld
 
 
+@pytest.mark.parametrize("known_at", [lambda angle: angle > 79.5, lambda angle: angle < 40.0])
+def test_a_plane_must_be_measured_throughout_the_top(motion_of, known_at) -> None:
+    angle = reaches([80.0] * 3)
+    motion: ArmMotion = motion_of(TIME, {"isb_elevation": angle, "isb_plane": np.zeros_like(TIME)})
+    motion.quality["isb_plane"][~known_at(angle)] = "heading_assumed"
+    found = set_measures(motion, EXERCISES["shoulder-abduction"])
+    assert len(found.repetitions) == 3
+    for one in found.repetitions:
+        assert one.measures["range"].withheld.startswith("plane: ")
+        assert one.measures["range"].value is None
+
+
 def test_what_is_assumed_or_lost_is_withheld_with_its_reason(motion_of) -> None:
     motion: ArmMotion = motion_of(TIME, {"elbow_flexion": reaches([80.0] * 3)})
     words = motion.quality["elbow_flexion"]

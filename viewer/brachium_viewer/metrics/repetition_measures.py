@@ -134,16 +134,17 @@ def _of_the_angle(part: ArmMotion, base: ArmMotion, exercise: Exercise) -> dict[
 
 
 def _off_plane(part: ArmMotion, exercise: Exercise) -> str:
-    """Return why an elevation is not the exercise's: empty when its plane at the top lies in the band."""
+    """Return why an elevation is not the exercise's: empty when its plane is measured throughout the top, and
+    lies in the band."""
     if exercise.plane is None:
         return ""
     elevation, plane = part.known("isb_elevation"), part.known("isb_plane")
-    seen = np.isfinite(elevation) & np.isfinite(plane)
-    high = seen & (elevation >= max(PLANE_FROM_DEG, 0.8 * np.nanmax(elevation, initial=0.0)))
+    high = elevation >= max(PLANE_FROM_DEG, 0.8 * np.nanmax(elevation, initial=0.0))
     if not high.any():
-        if seen.any():
-            return f"below {PLANE_FROM_DEG:.0f} deg of elevation the plane is undefined"
-        return f"plane: {why_not(part.quality['isb_plane'])}"
+        return f"below {PLANE_FROM_DEG:.0f} deg of elevation the plane is undefined"
+    if kinematics.coverage(part.time_s[high], np.isfinite(plane[high])) < ENOUGH:
+        return f"plane: {why_not(part.quality['isb_plane'][high])}"
+    high &= np.isfinite(plane)
     about = np.exp(1j * np.radians(plane[high]))
     middle = float(np.degrees(np.angle(about.mean())))
     low, top = PLANES_DEG[exercise.plane]
