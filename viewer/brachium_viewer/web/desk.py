@@ -108,7 +108,7 @@ class Desk:
         if not asked.create and not self._state.known(asked.subject):
             raise Refused(f"{asked.subject} is not known here: create it first")
         if self._sessions.subject not in (None, asked.subject):
-            raise Refused(f"a session of {self._sessions.subject} is recorded: end it first")
+            raise Refused(f"a session of {self._sessions.subject} is recorded: end it first, under Finish")
         self._state.choose(asked.subject)
         if asked.create:
             told = Session(side=asked.side, height_m=asked.height_m)

@@ -39,6 +39,8 @@ SCREENS = 32
 BUFFER_BYTES = 16384
 """What may wait in a connection: a dozen frames; then its screen is slow, and skips some."""
 HEARTBEAT_S = 10.0
+ASKING = 32
+"""Requests of one screen at once."""
 
 Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
 
@@ -158,16 +160,22 @@ class Rooms:
         asking: set[asyncio.Task[None]] = set()
         try:
             async for message in screen:
-                if message.type is WSMsgType.TEXT and len(asking) < 8:
-                    task = asyncio.create_task(_awaited(self._asked(seat, message.data)))
-                    asking.add(task)
-                    task.add_done_callback(asking.discard)
+                if message.type is not WSMsgType.TEXT:
+                    continue
+                while len(asking) >= ASKING:  # who asks faster waits: no question stays without its answer
+                    await asyncio.wait(asking, return_when=asyncio.FIRST_COMPLETED)
+                task = asyncio.create_task(self._ask(seat, message.data))
+                asking.add(task)
+                task.add_done_callback(asking.discard)
         finally:
             self._leave(seat)
             self._screens.discard(screen)
             for task in (sending, *asking):
                 task.cancel()
         return screen
+
+    async def _ask(self, seat: Seat, text: str) -> None:
+        await self._asked(seat, text)
 
     async def _close(self, app: web.Application) -> None:
         del app
@@ -190,7 +198,3 @@ async def _send(screen: web.WebSocketResponse, seat: Seat) -> None:
         while True:
             for text in await seat.take():
                 await screen.send_str(text)
-
-
-async def _awaited(asked: Awaitable[None]) -> None:
-    await asked

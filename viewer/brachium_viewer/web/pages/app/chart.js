@@ -17,7 +17,7 @@ export class Chart {
     this.marks = {};
     this.clear();
     this.make();
-    new ResizeObserver(() => this.plot.setSize(this.size())).observe(box);
+    new ResizeObserver(() => this.fit()).observe(box);
     document.addEventListener("theme", () => this.make());
     document.addEventListener("language", () => this.make());
   }
@@ -33,16 +33,23 @@ export class Chart {
     return { width: Math.max(this.box.clientWidth, 80), height: Math.max(this.box.clientHeight, 80) };
   }
 
+  fit() {
+    const unit = parseFloat(getComputedStyle(document.documentElement).fontSize) / 16;
+    if (unit === this.unit) this.plot.setSize(this.size());
+    else this.make();
+  }
+
   make() {
     this.plot?.destroy();
     const style = getComputedStyle(document.documentElement); // asked once: the answer costs a look at the whole page
     const colours = Object.fromEntries(COLOURS.map((name) => [name, style.getPropertyValue(name).trim()]));
     this.colour = (name) => colours[name];
+    this.unit = parseFloat(style.fontSize) / 16; // what is written grows with the letters of the page
     const axis = {
       stroke: this.colour("--muted"),
       grid: { stroke: this.colour("--line"), width: 1 },
       ticks: { show: false },
-      font: "12px system-ui, sans-serif",
+      font: `${12 * this.unit}px system-ui, sans-serif`,
     };
     this.plot = new uPlot(
       {
@@ -52,8 +59,8 @@ export class Chart {
         cursor: { show: false },
         scales: { x: { time: false }, y: { range: () => this.range() } },
         axes: [
-          { ...axis, size: 26, values: (plot, ticks) => ticks.map((at) => `${number(at).replace("-", "−")} s`) },
-          { ...axis, size: 46, values: (plot, ticks) => ticks.map((at) => `${number(at).replace("-", "−")}°`) },
+          { ...axis, size: 26 * this.unit, values: (plot, ticks) => ticks.map((at) => `${number(at).replace("-", "−")} s`) },
+          { ...axis, size: 46 * this.unit, space: 24 * this.unit, values: (plot, ticks) => ticks.map((at) => `${number(at).replace("-", "−")}°`) },
         ],
         series: [
           {},
@@ -129,7 +136,7 @@ export class Chart {
   under(plot) {
     const { band, goal, limit, need, rises } = this.marks;
     const { ctx, bbox } = plot;
-    const ratio = devicePixelRatio;
+    const ratio = devicePixelRatio * this.unit;
     const at = (value) => plot.valToPos(value, "y", true);
     ctx.save();
     ctx.beginPath();
@@ -150,15 +157,15 @@ export class Chart {
     }
     if (band) this.word(ctx, say("reference"), bbox.left + 6 * ratio, at(band[1]) + 14 * ratio, "--good", "left");
     const right = bbox.left + bbox.width - 6 * ratio;
-    this.line(ctx, bbox, need, at, "--ink", [2, 4], say("need"), bbox.left + 0.45 * bbox.width, -5);
-    this.line(ctx, bbox, goal, at, "--goal", [8, 5], say("goal"), right, -5);
-    this.line(ctx, bbox, limit, at, "--bad", [], say("limit"), bbox.left + 0.7 * bbox.width, rises ? -5 : 14);
+    this.line(ctx, bbox, need, at, "--ink", [2, 4], say("need"), bbox.left + 0.45 * bbox.width, -6);
+    this.line(ctx, bbox, goal, at, "--goal", [8, 5], say("goal"), right, rises ? 15 : -6);
+    this.line(ctx, bbox, limit, at, "--bad", [], say("limit"), bbox.left + 0.7 * bbox.width, rises ? -6 : 15);
     ctx.restore();
   }
 
   line(ctx, bbox, value, at, name, dash, word, x, below) {
     if (value == null) return;
-    const ratio = devicePixelRatio;
+    const ratio = devicePixelRatio * this.unit;
     ctx.strokeStyle = this.colour(name);
     ctx.lineWidth = 2 * ratio;
     ctx.setLineDash(dash.map((part) => part * ratio));

@@ -9,6 +9,7 @@ const HIP = new THREE.Vector3(0, 0, -0.46); // where a leaning trunk turns, from
 const COLOURS = { upper_arm: 0xe69f00, forearm: 0x3a9bd6, hand: 0x009e73 };
 const NOT_MEASURED = 0x8a939b;
 const BEYOND = 0xd55e00;
+const HANGING = { shoulder: [0.19, 0, 0], elbow: [0.215, -0.01, -0.3], wrist: [0.222, 0.03, -0.55], hand: [0.218, 0.045, -0.71] };
 const SAME = 0.005; // of its length: a limb is stretched so far before it is shaped anew
 
 const LIMBS = [
@@ -64,8 +65,19 @@ class Arm {
     this.limbs = LIMBS.map((row) => ({ ...row, limb: new Limb(this.group, row) }));
   }
 
+  /** An arm of which nothing is known belongs to the body: it hangs, in the body's colour. */
+  hang(mirror, colour) {
+    this.known = false;
+    const at = (joint) => new THREE.Vector3(...HANGING[joint]).multiply(new THREE.Vector3(mirror, 1, 1));
+    for (const { from, to, limb } of this.limbs) {
+      limb.rod.visible = true;
+      limb.place(at(from), at(to));
+      limb.surface.paint(colour);
+    }
+  }
+
   show(arm, beyond) {
-    this.group.visible = true;
+    this.known = true;
     for (const { part, from, to, limb } of this.limbs) {
       const first = arm.positions[from];
       const last = arm.positions[to];
@@ -108,18 +120,24 @@ export class Figure {
     scene.add(new THREE.Mesh(joined(legs), this.body), this.trunk);
     this.chest.add(new THREE.Mesh(joined([torso(), ball(HEAD), ball(NOSE), bone(YOKE)]), this.body));
     this.arms = { right: new Arm(this.chest), left: new Arm(this.chest) };
-    for (const arm of Object.values(this.arms)) arm.group.visible = false;
+    this.dress(false);
   }
 
   dress(dark) {
-    this.body.paint(dark ? 0x66727d : 0xc3ccd4);
+    this.colour = dark ? 0x66727d : 0xc3ccd4;
+    this.body.paint(this.colour);
+    for (const [side, arm] of Object.entries(this.arms)) if (!arm.known) this.hang(side);
+  }
+
+  hang(side) {
+    this.arms[side].hang(side === "right" ? 1 : -1, this.colour);
   }
 
   /** Show the arms of a frame; `beyond` names the side that is past its limit. Returns how high they reach, m. */
   show(arms, beyond) {
     for (const [side, arm] of Object.entries(this.arms)) {
       if (arms[side]) arm.show(arms[side], beyond === side);
-      else arm.group.visible = false;
+      else if (arm.known) this.hang(side);
     }
     const first = Object.values(arms)[0];
     if (first) {
@@ -132,9 +150,8 @@ export class Figure {
 
   /** What is drawn of the arms, for whoever checks it: by side and part, the two ends of each limb. */
   drawn() {
-    const shown = Object.entries(this.arms).filter(([, arm]) => arm.group.visible);
     return Object.fromEntries(
-      shown.map(([side, { limbs }]) => {
+      Object.entries(this.arms).map(([side, { limbs }]) => {
         const seen = limbs.filter(({ limb }) => limb.rod.visible);
         return [side, Object.fromEntries(seen.map(({ part, limb }) => [part, limb.ends()]))];
       }),

@@ -3,12 +3,13 @@
 import { MEASURED } from "./quality.js";
 import { number, say } from "./words.js";
 
-const WIDE = 340;
-const EDGE = 14;
+// All in units of the letters' size / 16: what is written grows with the letters of the page.
+const EDGE = 1;
 const TOP = 26;
 const HIGH = 18;
 const ABOVE = 15; // where words stand
-const BELOW = 60;
+const BELOW = 62;
+const ROW = 17;
 const WORDS = 150; // two words nearer than this would touch
 const SVG = "http://www.w3.org/2000/svg";
 
@@ -21,12 +22,26 @@ function element(name, words, text) {
 
 export class Gauge {
   constructor(box) {
-    this.svg = element("svg", { viewBox: `0 0 ${WIDE} 88`, role: "img" });
+    this.box = box;
+    this.wide = 0;
+    this.svg = element("svg", { role: "img" });
     box.append(this.svg);
+    new ResizeObserver(() => this.fit()).observe(box);
+  }
+
+  /** As wide as there is room. */
+  fit() {
+    const unit = parseFloat(getComputedStyle(document.documentElement).fontSize) / 16;
+    const wide = Math.round(this.box.clientWidth / unit);
+    if (!wide || wide === this.wide) return;
+    this.wide = wide;
+    if (this.marks) this.mean(this.marks);
   }
 
   /** Say what belongs to the angle: {band, need, goal, limit, rises}. */
-  mean({ band, need, goal, limit, rises }) {
+  mean(marks) {
+    this.marks = marks;
+    const { band, need, goal, limit, rises } = marks;
     const known = [...(band ?? [0, 180]), need, goal, limit].filter((value) => value != null);
     const low = Math.min(...known);
     const high = Math.max(...known);
@@ -35,40 +50,42 @@ export class Gauge {
     this.to = high + spare;
     this.svg.replaceChildren();
     const add = (name, words, text) => this.svg.append(element(name, words, text));
-    add("rect", { class: "track", x: EDGE, y: TOP, width: WIDE - 2 * EDGE, height: HIGH, rx: 9 });
+    add("rect", { class: "track", x: EDGE, y: TOP, width: Math.max(this.wide - 2 * EDGE, 0), height: HIGH, rx: 9 });
     if (band) {
       add("rect", { class: "band", x: this.at(band[0]), y: TOP, width: this.at(band[1]) - this.at(band[0]), height: HIGH, rx: 4 });
-      add("text", { x: WIDE / 2, y: 85, "text-anchor": "middle" }, say("reference.range", { low: number(band[0]), high: number(band[1]) }));
-    } else {
-      add("text", { x: WIDE / 2, y: 85, "text-anchor": "middle" }, say("reference.none"));
     }
     if (limit != null) {
-      const [x, end] = rises ? [this.at(limit), WIDE - EDGE] : [EDGE, this.at(limit)];
+      const [x, end] = rises ? [this.at(limit), this.wide - EDGE] : [EDGE, this.at(limit)];
       add("rect", { class: "forbidden", x, y: TOP, width: Math.max(end - x, 0), height: HIGH, rx: 4 });
       this.tick("limit", limit, say("limit"), BELOW);
     }
     if (goal != null) this.tick("goal", goal, say("goal"), ABOVE);
     const close = limit != null && need != null && Math.abs(this.at(limit) - this.at(need)) < WORDS;
-    if (need != null) this.tick("need", need, say("need"), close ? BELOW + 13 : BELOW);
+    if (need != null) this.tick("need", need, say("need"), close ? BELOW + ROW : BELOW);
+    const rows = close ? 2 : limit != null || need != null ? 1 : 0;
+    const legend = band ? say("reference.range", { low: number(band[0]), high: number(band[1]) }) : say("reference.none");
+    add("text", { x: 0, y: BELOW + rows * ROW }, legend);
+    this.svg.setAttribute("viewBox", `0 0 ${Math.max(this.wide, 1)} ${BELOW + rows * ROW + 6}`);
     this.now = element("path", { class: "now" });
     this.svg.append(this.now);
-    this.svg.setAttribute("aria-label", band ? say("reference.range", { low: number(band[0]), high: number(band[1]) }) : say("reference.none"));
-    this.show(null);
+    this.svg.setAttribute("aria-label", legend);
+    this.show(...(this.shown ?? [null]));
   }
 
   tick(kind, value, word, y) {
     const x = this.at(value);
-    const side = x > 0.8 * WIDE ? "end" : x < 0.2 * WIDE ? "start" : "middle";
+    const side = x > 0.75 * this.wide ? "end" : x < 0.25 * this.wide ? "start" : "middle";
     this.svg.append(element("path", { class: kind, d: `M${x} ${TOP - 5}V${TOP + HIGH + 5}` }));
     this.svg.append(element("text", { class: `${kind}-word`, x, y, "text-anchor": side }, `${word} ${number(value)}°`));
   }
 
   at(value) {
     const share = (value - this.from) / (this.to - this.from);
-    return EDGE + Math.min(Math.max(share, 0), 1) * (WIDE - 2 * EDGE);
+    return EDGE + Math.min(Math.max(share, 0), 1) * Math.max(this.wide - 2 * EDGE, 0);
   }
 
   show(value, quality) {
+    this.shown = [value, quality];
     this.now.setAttribute("visibility", value == null ? "hidden" : "visible");
     if (value == null) return;
     const x = this.at(value);

@@ -110,7 +110,7 @@ function recording() {
   const { state: how, seconds } = state.recording;
   $("recording").hidden = how !== "on" || !up; // cut off, nobody knows whether it still does
   const time = `${Math.floor((seconds ?? 0) / 60)}:${String((seconds ?? 0) % 60).padStart(2, "0")}`;
-  $("recording").textContent = say("recording", { time });
+  $("recording").textContent = say(state.live || !state.sensors.length ? "recording" : "recording.silent", { time });
   const alarms = state.alarms.map(({ what, reason }) => say(`alarm.${what}`, { reason: told(reason) }));
   if (state.stopped) alarms.unshift(stopSaid(state.stopped));
   renew($("alarm"), alarms.join(), () => alarms.map((text) => make("p", {}, text)));

@@ -21,7 +21,7 @@ export class People {
         const sides = one.sides.map((side) => say(`side.${side}`)).join(", ") || say("no-arm");
         const button = make("button", { type: "button" }, make("span", {}, one.name), make("span", { class: "small" }, sides));
         if (one.name === state.subject) button.setAttribute("aria-current", "true");
-        button.addEventListener("click", () => this.ask({ subject: one.name }));
+        button.addEventListener("click", () => this.ask({ subject: one.name }, "subjects-said"));
         return make("li", {}, button);
       }),
     );
@@ -29,17 +29,14 @@ export class People {
 
   create() {
     const height = $("create-height").valueAsNumber;
-    this.ask({
-      subject: $("create-name").value,
-      create: true,
-      side: $("create-side").value,
-      ...(Number.isFinite(height) ? { height_m: height / 100 } : {}),
-    });
+    const words = { subject: $("create-name").value, create: true, side: $("create-side").value };
+    this.ask(Number.isFinite(height) ? { ...words, height_m: height / 100 } : words, "create-said");
   }
 
-  async ask(words) {
+  /** Ask, and say what was answered beside what was pressed. */
+  async ask(words, where) {
     const answer = await this.link.ask("subject", words);
-    tell($("create-said"), answer);
+    for (const place of ["subjects-said", "create-said"]) tell($(place), place === where ? answer : { ok: true });
     if (answer.ok) $("subjects").close();
   }
 }

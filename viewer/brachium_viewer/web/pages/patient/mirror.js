@@ -6,14 +6,12 @@ import { painter } from "../app/painter.js";
 import { dark } from "../app/theme.js";
 
 const CHEST = 1.34; // m above the floor: the middle of what is shown
-const ASIDE = 0.3; // m towards the arm: the other side needs no room
-const REACH = [0.72, 0.88]; // m from there to either side and up: an arm stretched out stays in the picture
+const REACH = [0.98, 0.88]; // m from there to either side and up: an arm stretched out stays in the picture
 const ANGLE = 30;
 
 export class Mirror {
   constructor(place) {
     this.place = place;
-    this.side = "right";
     try {
       this.renderer = painter(place);
     } catch {
@@ -41,20 +39,15 @@ export class Mirror {
     this.renderer.setSize(wide, high, false);
     this.camera.aspect = wide / high;
     const seen = Math.max(REACH[1], REACH[0] / this.camera.aspect);
-    const x = this.side === "right" ? -ASIDE : ASIDE;
-    this.camera.position.set(x, seen / Math.tan((ANGLE * Math.PI) / 360), CHEST + 0.1);
-    this.camera.lookAt(x, 0, CHEST);
+    this.camera.position.set(0, seen / Math.tan((ANGLE * Math.PI) / 360), CHEST + 0.1);
+    this.camera.lookAt(0, 0, CHEST);
     this.camera.updateProjectionMatrix();
     this.renderer.render(this.scene, this.camera); // at once: another size emptied the canvas
   }
 
-  /** The newest of one arm; the other one is not shown. */
+  /** The newest of one arm; the other one hangs. */
   show(side, arm, beyond) {
     if (!this.renderer) return;
-    if (side !== this.side) {
-      this.side = side;
-      this.fit();
-    }
     this.figure.show({ [side]: arm }, beyond ? side : null);
     this.draw();
   }

@@ -1,0 +1,85 @@
+"""How the therapist's page stands on a tablet held across and at a desk, in the longer language."""
+
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+
+sync_api = pytest.importorskip("playwright.sync_api")
+
+pytestmark = [pytest.mark.network, pytest.mark.browser]
+
+PATIENCE_MS = 20_000
+SHOWN = """() => {
+  const put = (id, words) => {
+    document.getElementById(id).hidden = false;
+    document.getElementById(id).textContent = words;
+  };
+  put("headline", "6 von 6 Sensoren aktiv");
+  put("recording", "Aufnahme 31:57");
+  put("origin", "Emuliert: von niemandem getragen");
+}"""
+
+
+@pytest.fixture
+def page(browser, serve_pages, moving_arm, tmp_path) -> Iterator[Any]:
+    with serve_pages(endpoint=moving_arm, sessions=tmp_path, open_door=True) as serving:
+        page = browser.new_context(locale="de-DE", viewport={"width": 1180, "height": 820}).new_page()
+        page.goto(serving.address)
+        sync_api.expect(page.locator("#subject-name")).to_have_text("p01", timeout=PATIENCE_MS)
+        sync_api.expect(page.locator("#angle-value")).to_contain_text("°", timeout=PATIENCE_MS)
+        yield page
+        page.close()
+
+
+def box(page, selector: str) -> dict[str, float]:
+    found: dict[str, float] = page.locator(selector).bounding_box()
+    return found
+
+
+def bottom(page, selector: str) -> float:
+    found = box(page, selector)
+    return found["y"] + found["height"]
+
+
+@pytest.mark.parametrize("size", [(1180, 820), (1100, 720), (1400, 900)])
+def test_the_footer_lies_below_everything(page, size):
+    page.set_viewport_size({"width": size[0], "height": size[1]})
+    page.evaluate(SHOWN)
+    page.wait_for_timeout(200)
+    top = box(page, "footer p")["y"]
+    for above in ("#course", "#panel", "#actions"):
+        assert bottom(page, above) <= top + 1, above
+    assert bottom(page, "#panel") <= box(page, "#actions")["y"]
+    assert bottom(page, "#angle") <= box(page, "#course")["y"]
+
+
+def test_what_is_said_under_start_moves_nothing(page):
+    page.set_viewport_size({"width": 1400, "height": 900})
+    page.wait_for_timeout(200)
+    before = [box(page, one) for one in ("#stage", "#angle", "#course", "#start")]
+    page.evaluate("document.getElementById('action-said').textContent = 'Satz beendet: 22 Wiederholungen.'")
+    page.wait_for_timeout(200)
+    assert [box(page, one) for one in ("#stage", "#angle", "#course", "#start")] == before
+
+
+def test_the_gauge_is_as_wide_as_its_card_and_grows_with_the_letters(page):
+    def legend() -> float:
+        boxes = [text.bounding_box() for text in page.locator("#gauge text").all()]
+        return max(float(one["height"]) for one in boxes)
+
+    for width in (1400, 820, 390):
+        page.set_viewport_size({"width": width, "height": 1000})
+        page.wait_for_timeout(200)
+        track = box(page, "#gauge .track")
+        assert track["x"] == pytest.approx(box(page, "#angle-value")["x"], abs=3.0)
+        assert track["x"] + track["width"] == pytest.approx(
+            box(page, "#gauge")["x"] + box(page, "#gauge")["width"], abs=3.0
+        )
+        assert page.evaluate("document.querySelector('#gauge text').getScreenCTM().a") == pytest.approx(
+            1.0, abs=0.02
+        )
+    small = legend()
+    page.evaluate("document.documentElement.style.fontSize = '200%'")
+    page.wait_for_timeout(300)
+    assert legend() == pytest.approx(2.0 * small, rel=0.15)
