@@ -39,13 +39,14 @@ def test_a_limit_outlives_reloads_joins_and_sets_begun_elsewhere(browser, serve_
         holds(one, "#subject-name", "p01")
         one.click("#tab-exercise")
         one.check("#use-limit")
+        other = context.new_page()  # joins before any set was begun
+        other.goto(serving.address)
+        planned(other, limit=90, goal=85)
         holds(one, "#plan-said", "Goal moved to 85°: 5° before the limit, where the alarm sounds.")
         one.fill("#plan-limit", "92")  # no multiple of the buttons' step
         one.press("#plan-limit", "Tab")
         planned(one, limit=92, goal=85)
 
-        other = context.new_page()  # joins before any set was begun
-        other.goto(serving.address)
         planned(other, limit=92, goal=85)
         one.reload()
         planned(one, limit=92, goal=85)

@@ -115,7 +115,8 @@ export class Plan {
     this.adopted = key;
     if (newest) {
       this.mine.set(subject, newest);
-      this.fill(newest);
+      if (this.says(newest)) this.filled();
+      else this.fill(newest);
     } else if (unknown) {
       this.fill(unknown);
       this.tell();
@@ -144,6 +145,11 @@ export class Plan {
   get known() {
     const rows = [...this.plans, this.mine.get(this.subject)];
     return rows.find((row) => row?.exercise === $("which").value && row.side === this.side);
+  }
+
+  /** Whether the form says this plan already. */
+  says(row) {
+    return Object.entries(this.words).every(([name, value]) => row[name] === value);
   }
 
   /** Which set is next. */
