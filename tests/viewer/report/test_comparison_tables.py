@@ -46,7 +46,8 @@ def errors(found: Any) -> Any:
 
 
 @pytest.mark.parametrize(
-    ("by_deg", "said"), [(15.0, WITHIN_ERROR), (25.0, WITHIN_ERROR), (0.0, "+20 deg (129 %)")]
+    ("by_deg", "said"),
+    [(15.0, WITHIN_ERROR), (25.0, WITHIN_ERROR), (0.0, "+20 deg (129\N{NO-BREAK SPACE}%)")],
 )
 def test_arms_differ_beyond_the_error_alone(every: Any, by_deg: float, said: str) -> None:
     found = groups([every["right"], farther(every["left"], by_deg)])

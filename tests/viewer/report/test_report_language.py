@@ -145,10 +145,10 @@ def test_another_language_is_refused_with_those_that_are_there():
         ("elbow r not found: too little movement: the elbow bent by 5 deg, at least 30 are needed; bend and "
          "straighten it", "elbow r nicht gefunden: Zu wenig Bewegung: Der Ellbogen beugte sich um 5°, "
          "mindestens 30° sind nötig; beugen und strecken"),
-        ("range of motion, peak speed, in 2 of 9 repetitions (reaching, left, assisted)",
-         "Bewegungsumfang, höchste Geschwindigkeit, bei 2 von 9 Wiederholungen (Nach vorn greifen, links, "
-         "unterstützt)"),
-        ("-3.5 (85 %)", "-3,5 (85 %)"),
+        ("range of motion, peak speed (reaching, left, assisted: 2 of 9); start (drinking, left, active)",
+         "Bewegungsumfang, höchste Geschwindigkeit (Nach vorn greifen, links, unterstützt: 2 von 9); "
+         "Anfang (Trinken, links, aktiv)"),
+        ("-3.5 (85\N{NO-BREAK SPACE}%)", "-3,5 (85\N{NO-BREAK SPACE}%)"),
         ("/x/a.mcap: not closed: read up to the cut; 2 damaged blocks left out",
          "/x/a.mcap: nicht geschlossen: bis zum Abbruch gelesen; 2 beschädigte Blöcke ausgelassen"),
         ("left out: 3 messages malformed, 1 message wrong_type",

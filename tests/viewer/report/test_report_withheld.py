@@ -6,6 +6,8 @@ from typing import Any
 
 import pytest
 
+from brachium_viewer.catalogue import catalogue
+from brachium_viewer.metrics.measure import measure
 from brachium_viewer.metrics.measure import withheld as no_measure
 from brachium_viewer.report import page
 from brachium_viewer.report.groups import groups, lags, symmetries
@@ -56,9 +58,7 @@ def test_what_is_known_of_most_repetitions_says_of_how_many_it_is_not(worn: Path
         spoilt[name] = no_measure("samples were lost", "deg")
     again = groups(session.sets)
     lines = dict(withheld(again, symmetries(again, "right"), lags(again), []))
-    assert (
-        "range of motion, in 1 of 10 repetitions (elbow flexion, right, active)" in lines["samples were lost"]
-    )
+    assert "range of motion (elbow flexion, right: 1 of 10)" in lines["samples were lost"]
     assert again[0].pooled.medians["range"].coverage == pytest.approx(0.9)
 
 
@@ -79,3 +79,22 @@ def test_components_that_are_not_there_are_told(worn: Path) -> None:
     every = groups(session_from_recording(worn).sets)
     lines = dict(withheld(every, parts=[(every[0], None)]))
     assert lines["fewer than two joint angles were measured and moved"].startswith("components (elbow")
+
+
+def test_a_reason_that_differs_in_its_numbers_alone_is_told_once(worn: Path) -> None:
+    session = session_from_recording(worn)
+    gaps = ["0.12", "0.3", "0.14", *[""] * 7]
+    for one, gap in zip(groups(session.sets)[0].pooled.repetitions, gaps, strict=True):
+        for name in ("sparc", "ldlj"):
+            why = f"a gap of {gap} s in the way there may hide a jerk"
+            one.measures[name] = no_measure(why, "1") if gap else measure(-1.4, "1")
+    lines = [one for one in withheld(groups(session.sets)) if "may hide a jerk" in one[0]]
+    assert lines == [
+        (
+            "a gap of 0.12 to 0.3 s in the way there may hide a jerk",
+            "smoothness SPARC, smoothness LDLJ (elbow flexion, right: 3 of 10)",
+        )
+    ]
+    assert catalogue("de").told(f"{lines[0][0]}:") == (
+        "eine Lücke von 0,12 bis 0,3 s im Hinweg kann einen Ruck verbergen:"
+    )

@@ -68,7 +68,11 @@ def _between(one: Symmetry, smallest: SmallestChange) -> str:
     if abs(one.range_change.value) <= smallest.value_deg:
         return words.WITHIN_ERROR
     said = f"{one.range_change.value:+.0f} deg"
-    return said if one.range_percent.value is None else f"{said} ({one.range_percent.value:.0f} %)"
+    return (
+        said
+        if one.range_percent.value is None
+        else f"{said} ({one.range_percent.value:.0f}\N{NO-BREAK SPACE}%)"
+    )
 
 
 def active_passive(

@@ -10,6 +10,7 @@ from brachium_viewer.metrics.both_arms import difference, symmetry
 from brachium_viewer.metrics.change import Change, SmallestChange, smallest_change
 from brachium_viewer.metrics.measure import Measure
 from brachium_viewer.metrics.set_measures import SetMeasures, loss_between, together
+from brachium_viewer.report import words
 from brachium_viewer.sessions.records import METHOD, PastSet, SetRecord
 
 FARTHEST = "farthest of all"
@@ -33,6 +34,11 @@ class Group:
     mode: str
     sets: tuple[SetRecord, ...]
     pooled: SetMeasures
+
+    @property
+    def name(self) -> str:
+        """Return what was done by which arm, and how where it was not active."""
+        return words.movement(self.exercise.name, self.side, "" if self.mode == "active" else self.mode)
 
     @property
     def what(self) -> What:

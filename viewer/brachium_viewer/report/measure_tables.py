@@ -48,12 +48,8 @@ def _point(groups: Sequence[Group]) -> str | None:
 
 
 def _table(title: str, columns: Sequence[Column], groups: Sequence[Group]) -> PageTable:
-    rows = [[_movement(group), *(said(group) for _, said in columns)] for group in groups]
+    rows = [[group.name, *(said(group) for _, said in columns)] for group in groups]
     return PageTable(title, ["", *(head for head, _ in columns)], rows)
-
-
-def _movement(group: Group) -> str:
-    return words.movement(group.exercise.name, group.side, "" if group.mode == "active" else group.mode)
 
 
 def _measure(name: str, groups: Sequence[Group]) -> Column:

@@ -118,9 +118,9 @@ def page(report: Report, language: str = ENGLISH) -> str:
     arms, moved = symmetries(groups, report.affected), lags(groups)
     parts = principal_components(report)
     shown = [
-        tables.within_session(groups),
         beside.between_arms(arms, report.errors),
         beside.active_passive(moved, groups, report.errors),
+        tables.within_session(groups),
         tables.principal(parts),
     ]
     segments = {

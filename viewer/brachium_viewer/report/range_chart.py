@@ -10,7 +10,7 @@ from brachium_viewer.report.panels import Panel, Sheet, Span, apart, round_numbe
 from brachium_viewer.report.report_charts import MODE_COLOURS, WIDTH_IN
 
 BAND, NEED = "#e3e9ef", "#8a97a5"
-ROW_IN, LOW_ROW_IN = 0.29, 0.21
+ROW_IN, LOW_ROW_IN = 0.26, 0.2
 MANY = 12
 """Rows; more of them are lower, so that all are on one sheet."""
 LETTER_IN = 0.56 / 72

@@ -16,7 +16,8 @@ JOINT_COLOURS = {"elbow": "#c2570c", "wrist": "#117a65", "hand": "#0b5cad"}
 VIEWS = (("from the front", 0, 2), ("from the side", 1, 2), ("from above", 0, 1))
 """Trunk axes: x to the right, y forward, z up."""
 AXIS_NAMES = ("right", "forward", "up")
-WIDTH_IN, HEIGHT_IN = 7.3, 1.5
+WIDTH_IN, HEIGHT_IN = 7.3, 1.34
+TITLE_IN = 1.27
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -44,7 +45,7 @@ def movement(name: str, lines: MovementLines) -> str:
         for number in range(len(VIEWS)):
             _view(sheet, lines, lowest, size, number)
         for i, joint in enumerate(lines.paths):
-            sheet.text(2.46 + 0.72 * i, 1.43, joint, JOINT_COLOURS[joint], weight="bold", va="center")
+            sheet.text(2.46 + 0.72 * i, TITLE_IN, joint, JOINT_COLOURS[joint], weight="bold", va="center")
         _over_time(sheet, lines)
     return sheet.svg(name)
 
@@ -52,7 +53,7 @@ def movement(name: str, lines: MovementLines) -> str:
 def _overlay(sheet: Sheet, lines: MovementLines) -> None:
     goal = np.array([] if lines.goal_deg is None else [lines.goal_deg])
     spans = reach([*lines.overlays.values(), goal])
-    panel = Panel(sheet=sheet, corner_in=(0.42, 0.34), size_in=(1.62, 1.0), x=(0.0, 100.0), y=spans)
+    panel = Panel(sheet=sheet, corner_in=(0.42, 0.34), size_in=(1.62, 0.84), x=(0.0, 100.0), y=spans)
     for mode, rows in lines.overlays.items():
         colour = MODE_COLOURS.get(mode, INK)
         if np.isfinite(rows).any():
@@ -107,7 +108,7 @@ def _over_time(sheet: Sheet, lines: MovementLines) -> None:
     x = 0.0, max(float(lines.time_s[-1]), 1e-3)
     for i, name in enumerate(AXIS_NAMES):
         y = reach(place[:, i] for place in lines.places.values())
-        corner_in, size_in = (5.72, 0.34 + 0.36 * (2 - i)), (1.12, 0.29)
+        corner_in, size_in = (5.72, 0.34 + 0.3 * (2 - i)), (1.12, 0.24)
         panel = Panel(sheet=sheet, corner_in=corner_in, size_in=size_in, x=x, y=y)
         for joint, place in lines.places.items():
             panel.line(_points(lines.time_s, place[:, i]), JOINT_COLOURS[joint], 0.8)
@@ -116,4 +117,4 @@ def _over_time(sheet: Sheet, lines: MovementLines) -> None:
         sheet.text(beside_in, corner_in[1] + 0.5 * size_in[1], name, QUIET, va="center", ha="left")
         if i == 2:
             panel.name_x("s, of one set")
-    sheet.text(5.72, 1.43, "over time, cm", fontsize=TEXT + 0.4, va="center")
+    sheet.text(5.72, TITLE_IN, "over time, cm", fontsize=TEXT + 0.4, va="center")

@@ -35,7 +35,7 @@ def number(measure: Measure, digits: int, *, signed: bool = False) -> str:
         return "not reached" if measure.withheld == words.NOT_REACHED else NONE
     value = round(measure.value, digits) + 0.0  # no minus zero
     shown = f"{value:+.{digits}f}" if signed and value else f"{value:.{digits}f}"
-    return shown if measure.coverage >= FULL else f"{shown} ({100 * measure.coverage:.0f} %)"
+    return shown if measure.coverage >= FULL else f"{shown} ({100 * measure.coverage:.0f}\N{NO-BREAK SPACE}%)"
 
 
 def done(groups: Sequence[Group]) -> PageTable:
@@ -85,7 +85,7 @@ def within_session(groups: Sequence[Group]) -> PageTable | None:
         cells = [g.pooled.first_to_last[name] for name in names]
         if any(cell.value is not None for cell in cells):
             shown = [number(c, words.MEASURES[n][1], signed=True) for n, c in zip(names, cells, strict=True)]
-            rows.append([words.movement(g.exercise.name, g.side, g.mode), *shown])
+            rows.append([g.name, *shown])
     if not rows:
         return None
     head = ["", *(f"{words.MEASURES[n][0]}, {groups[0].pooled.medians[n].unit}" for n in names)]
@@ -102,7 +102,7 @@ def principal(found: Sequence[tuple[Group, Components | None]]) -> PageTable | N
         first = sorted(zip(parts.directions[0], parts.names, strict=True), key=lambda one: -abs(one[0]))[:3]
         rows.append(
             [
-                words.movement(group.exercise.name, group.side, group.mode),
+                group.name,
                 *[*(f"{100 * share:.0f}" for share in parts.explained[:3]), NONE][:3],
                 ", ".join(
                     f"{name.replace('_', ' ')} {weight:+.2f}" for weight, name in first if abs(weight) >= 0.1

@@ -1,6 +1,7 @@
 """What a report does not show, and why: each dash in its tables has its reason. Pure."""
 
-from collections.abc import Iterable, Iterator, Sequence
+import re
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 from brachium_viewer.metrics.both_arms import Components
@@ -13,12 +14,17 @@ LAST_BESIDE_FIRST = ("range", "peak_speed", "movement_time", "sparc")
 """Of the measures, those whose change within the session a report tells."""
 
 
+_NUMBER = re.compile(r"\d+(?:\.\d+)?")
+
+
 class Dash(NamedTuple):
-    """One number that is not shown."""
+    """One number that is not shown, or not of all repetitions."""
 
     why: str
     what: str
     where: str
+    share: str = ""
+    """Of how many repetitions it is not known; empty when of all of them."""
 
 
 def withheld(
@@ -27,41 +33,47 @@ def withheld(
     lags: Sequence[tuple[Group, Measure]] = (),
     parts: Sequence[tuple[Group, Components | None]] = (),
 ) -> list[tuple[str, str]]:
-    """Return what is not shown, and why: (reason, what), each reason once; then what a median leaves out."""
-    every = [*_of_groups(groups), *_of_comparisons(symmetries, lags, parts)]
-    found = [(why, _told([one for one in every if one.why == why], len(groups))) for why in _whys(every)]
-    return [*found, *(line for g in groups for line in _partly(g))]
+    """Return what is not shown, and why: (reason, what), each reason once, whatever its numbers.
+
+    What is known of some repetitions says of how many it is not, whether they suffice for a median or not.
+    """
+    alike: dict[str, list[Dash]] = {}
+    for one in (*_of_groups(groups), *_of_comparisons(symmetries, lags, parts)):
+        alike.setdefault(_kind(one.why), []).append(one)
+    return [(_why([one.why for one in some]), _told(some, len(groups))) for some in alike.values()]
 
 
-def _whys(every: Iterable[Dash]) -> list[str]:
-    return list(dict.fromkeys(one.why for one in every))
+def _kind(why: str) -> str:
+    return _NUMBER.sub("#", why)
+
+
+def _why(alike: Sequence[str]) -> str:
+    """Return reasons that differ in their numbers alone as one: the least to the largest of each."""
+    numbers = [list(dict.fromkeys(some)) for some in zip(*map(_NUMBER.findall, alike), strict=True)]
+    spans = iter([(min(some, key=float), max(some, key=float)) for some in numbers])
+    said = ((low if low == high else f"{low} to {high}") for low, high in spans)
+    return _NUMBER.sub(lambda _: next(said), alike[0])
 
 
 def _told(alike: Sequence[Dash], groups: int) -> str:
-    """Return in words what is withheld for one reason; where, unless it is so of all groups."""
+    """Return in words what is withheld for one reason; where, unless it is so of all of all groups."""
     labels: dict[str, dict[str, None]] = {}
     for one in alike:
-        labels.setdefault(one.what, {})[one.where] = None
+        labels.setdefault(one.what, {})[f"{one.where}: {one.share}" if one.share else one.where] = None
     places: dict[tuple[str, ...], list[str]] = {}
     for label, where in labels.items():
         places.setdefault(tuple(where), []).append(label)
+    everywhere = not any(one.share for one in alike)
     return "; ".join(
-        ", ".join(some) + ("" if len(where) == groups else f" ({'; '.join(where)})")
+        ", ".join(some) + ("" if everywhere and len(where) == groups else f" ({'; '.join(where)})")
         for where, some in places.items()
     )
 
 
-def _where(group: Group) -> str:
-    return words.movement(group.exercise.name, group.side, group.mode)
-
-
 def _of_groups(groups: Sequence[Group]) -> Iterator[Dash]:
     for g in groups:
-        pooled, where = g.pooled, _where(g)
-        for name in words.MEASURES:
-            why = pooled.medians[name].withheld
-            if why and why != words.NOT_REACHED:
-                yield Dash(why, words.label(name, pooled.path_of), where)
+        yield from _of_measures(g)
+        pooled, where = g.pooled, g.name
         if pooled.best_peak.withheld:
             yield Dash(pooled.best_peak.withheld, "farthest of all", where)
         if g.exercise.straightens and pooled.extension_deficit.withheld:
@@ -74,6 +86,31 @@ def _of_groups(groups: Sequence[Group]) -> Iterator[Dash]:
                     yield Dash(one.withheld, f"last {FEW} beside the first: {label}", where)
 
 
+def _of_measures(group: Group) -> Iterator[Dash]:
+    """Return each measure that is not shown, and each that is not known of all repetitions."""
+    repetitions, pooled = group.pooled.repetitions, group.pooled
+    known = [name for name in words.MEASURES if any(r.measures[name].value is not None for r in repetitions)]
+    lost: dict[tuple[tuple[str, ...], int], list[str]] = {}
+    for name in words.MEASURES:
+        label, why = words.label(name, pooled.path_of), pooled.medians[name].withheld
+        missing = [m.withheld for r in repetitions if (m := r.measures[name]).value is None]
+        if name in known and missing:
+            lost.setdefault((_commonest(missing), len(missing)), []).append(label)
+        elif why and why != words.NOT_REACHED:
+            yield Dash(why, label, group.name)
+    for (whys, count), labels in lost.items():
+        for label in ["every measure"] if len(labels) == len(known) else labels:
+            for why in whys:
+                yield Dash(why, label, group.name, f"{count} of {len(repetitions)}")
+
+
+def _commonest(reasons: Sequence[str]) -> tuple[str, ...]:
+    """Return those of the commonest kind, each once; they differ in their numbers alone."""
+    kinds = [_kind(why) for why in reasons]
+    most = max(kinds, key=kinds.count)
+    return tuple(dict.fromkeys(why for why in reasons if _kind(why) == most))
+
+
 def _of_comparisons(
     symmetries: Sequence[Symmetry],
     lags: Sequence[tuple[Group, Measure]],
@@ -81,30 +118,12 @@ def _of_comparisons(
 ) -> Iterator[Dash]:
     for s in symmetries:
         if s.range_change.withheld:
-            yield Dash(s.range_change.withheld, "both arms: range of motion", _where(s.group))
+            yield Dash(s.range_change.withheld, "both arms: range of motion", s.group.name)
         if s.ldlj_change.withheld:
-            yield Dash(s.ldlj_change.withheld, "both arms: difference of LDLJ", _where(s.group))
+            yield Dash(s.ldlj_change.withheld, "both arms: difference of LDLJ", s.group.name)
     for group, lag in lags:
         if lag.withheld:
             yield Dash(lag.withheld, "farther when moved", words.movement(group.exercise.name, group.side))
     for group, found in parts:
         if found is None:
-            yield Dash(words.NO_COMPONENTS, "components", _where(group))
-
-
-def _partly(group: Group) -> list[tuple[str, str]]:
-    """Return what is shown of most repetitions, and why not of all."""
-    repetitions, pooled = group.pooled.repetitions, group.pooled
-    shown = [name for name in words.MEASURES if pooled.medians[name].value is not None]
-    left_out: dict[tuple[str, int], list[str]] = {}
-    for name in shown:
-        missing = [m.withheld for r in repetitions if (m := r.measures[name]).value is None]
-        if missing:
-            label = words.label(name, pooled.path_of)
-            left_out.setdefault((max(missing, key=missing.count), len(missing)), []).append(label)
-    found = []
-    for (why, count), labels in left_out.items():
-        what = ["every measure"] if len(labels) == len(shown) else labels
-        where = f"in {count} of {len(repetitions)} repetitions ({_where(group)})"
-        found.append((why, ", ".join([*what, where])))
-    return found
+            yield Dash(words.NO_COMPONENTS, "components", group.name)
