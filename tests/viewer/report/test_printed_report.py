@@ -19,25 +19,39 @@ LEAST_POINTS = 7.5
 WORST = "p" + "seudonym-without-a-place-to-break" * 3
 
 
-def session_of(worn, names):
-    """Return a session whose every exercise was done by both arms, actively and moved, its numbers as long as
-    they get."""
+EVERYTHING = [
+    (name, side, mode)
+    for name in list(EXERCISES)[:9]
+    for side in ("right", "left")
+    for mode in ("active", "assisted")
+]
+USUAL = [
+    ("elbow-flexion", "right", "active"),
+    ("elbow-flexion", "right", "passive"),
+    ("elbow-flexion", "left", "active"),
+    ("shoulder-abduction", "right", "active"),
+    ("wrist-flexion", "right", "active"),
+    ("drinking", "right", "active"),
+]
+"""Of twenty minutes."""
+SHEETS = 3
+
+
+def session_of(worn, whats):
+    """Return a session in which all this was done."""
     contents = load(worn)
     motions = sessions.motions(contents, "p01")
     session = sessions.session(contents, "worn.mcap", "p01", motions, None)
     (one,) = [s for s in session.sets if s.what == ("elbow-flexion", "right", "passive")]
     sets = [
         replace(one, measures=replace(one.measures, exercise=name, side=side, mode=mode))
-        for name in names
-        for side in ("right", "left")
-        for mode in ("active", "assisted")
+        for name, side, mode in whats
     ]
-    report = build(contents, replace(session, sets=tuple(sets)), motions, lambda *_: ())
-    groups = [replace(group, pooled=_long(group.pooled)) for group in report.groups]
-    return replace(report, groups=groups)
+    return build(contents, replace(session, sets=tuple(sets)), motions, lambda *_: ())
 
 
 def _long(pooled):
+    """Return measures whose numbers are as long as they get."""
     medians = {
         name: replace(m, value=-100.0 - i if m.unit in ("deg", "deg/s") else -10.0 - i, coverage=0.85)
         for i, (name, m) in enumerate(pooled.medians.items())
@@ -47,7 +61,8 @@ def _long(pooled):
 
 @pytest.fixture(scope="module", params=["en", "de"])
 def printed(request, worn, browser, tmp_path_factory):
-    report = session_of(worn, list(EXERCISES)[:9])
+    report = session_of(worn, EVERYTHING)
+    report = replace(report, groups=[replace(g, pooled=_long(g.pooled)) for g in report.groups])
     folder = tmp_path_factory.mktemp("printed")
     shown = folder / "report.html"
     text = page.page(report, request.param).replace("p01</h1>", f"{WORST}</h1>")
@@ -84,3 +99,11 @@ def test_what_tables_say_can_be_read(printed):
         one.extract_text(visitor_text=seen)
     assert sizes
     assert min(sizes) >= LEAST_POINTS
+
+
+@pytest.mark.parametrize("language", ["en", "de"])
+def test_a_usual_session_is_on_few_sheets(worn, browser, tmp_path, language):
+    shown = tmp_path / "report.html"
+    shown.write_text(page.page(session_of(worn, USUAL), language), encoding="utf-8")
+    assert print_page(browser, shown, tmp_path / "report.pdf") == []
+    assert len(PdfReader(tmp_path / "report.pdf").pages) <= SHEETS
