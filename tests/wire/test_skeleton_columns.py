@@ -126,6 +126,8 @@ def assert_same(columns: SkeletonColumns, taken: list[tuple[int, Skeleton]]) -> 
         np.testing.assert_array_equal(columns.positions_m(joint), places.reshape(-1, 3))
     shift = np.array([s.shoulder_shift or unknown for s in skeletons], dtype=float).reshape(-1, 3)
     np.testing.assert_array_equal(columns.shoulder_shift_m(), shift)
+    sd = np.array([s.shoulder_shift_sd or unknown for s in skeletons], dtype=float).reshape(-1, 3)
+    np.testing.assert_array_equal(columns.shoulder_shift_sd_m(), sd)
     for which, skeleton in zip(columns.form.tolist(), skeletons, strict=True):
         assert words(columns.examples[which]) == words(skeleton)
 

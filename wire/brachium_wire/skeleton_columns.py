@@ -107,6 +107,10 @@ class SkeletonColumns:
         """Return the shoulder's displacement (n, 3) in trunk axes."""
         return self._floats([("shift", i) for i in range(3)])
 
+    def shoulder_shift_sd_m(self) -> Floats:
+        """Return its standard deviation (n, 3) along trunk axes."""
+        return self._floats([("shiftsd", i) for i in range(3)])
+
     def _floats(self, paths: list[Path]) -> Floats:
         out = np.full((len(self), len(paths)), np.nan)
         for part in self._parts:

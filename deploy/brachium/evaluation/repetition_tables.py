@@ -178,6 +178,7 @@ def arm_measures(
         quality=quality,
         positions_m={j: places[j][rows] for j in JOINTS},
         shoulder_shift_m=np.full((len(time_s), 3), np.nan),
+        shoulder_shift_sd_m=np.full((len(time_s), 3), np.nan),
         sternum=np.zeros(len(time_s), dtype=np.bool_),
     )
     return set_measures(motion, exercise)

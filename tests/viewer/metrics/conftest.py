@@ -17,6 +17,7 @@ def build(
     *,
     hand: np.ndarray | None = None,
     shift: np.ndarray | None = None,
+    shift_sd: np.ndarray | None = None,
     with_sternum: bool = False,
 ) -> ArmMotion:
     """Return a motion; angles that are not given are measured as 0, the trunk's without a sternum missing."""
@@ -37,6 +38,7 @@ def build(
         quality=quality,
         positions_m=places,
         shoulder_shift_m=np.full((n, 3), np.nan) if shift is None else shift,
+        shoulder_shift_sd_m=np.full((n, 3), np.nan) if shift_sd is None else shift_sd,
         sternum=np.full(n, with_sternum),
     )
 

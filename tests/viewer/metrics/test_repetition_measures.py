@@ -170,6 +170,17 @@ def test_the_hands_way(motion_of) -> None:
     assert found[1].medians["hand_path"].value > 0.35
 
 
+@pytest.mark.parametrize(("sd_m", "is_withheld"), [(0.01, False), (0.02, True)])
+def test_a_shoulder_that_moved_no_more_than_its_error_is_not_said_to(motion_of, sd_m, is_withheld) -> None:
+    shift = np.zeros((len(TIME), 3))
+    shift[:, 2] = reaches([0.05] * 3)
+    angles = {"elbow_flexion": reaches([80.0] * 3)}
+    motion = motion_of(TIME, angles, shift=shift, shift_sd=np.full_like(shift, sd_m))
+    found = set_measures(motion, EXERCISES["elbow-flexion"]).medians["shoulder_shift"]
+    assert (found.value is None) == is_withheld
+    assert ("no more than its own error" in found.withheld) == is_withheld
+
+
 def test_the_shoulder_is_named_by_what_is_worn(motion_of) -> None:
     shift = np.zeros((len(TIME), 3))
     shift[:, 2] = reaches([0.05] * 3)

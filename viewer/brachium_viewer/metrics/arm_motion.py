@@ -40,6 +40,8 @@ class ArmMotion:
     """By JOINTS: (n, 3) in trunk axes."""
     shoulder_shift_m: Floats
     """(n, 3) in trunk axes from the pose; NaN where it is not measured, as while it fades in or out."""
+    shoulder_shift_sd_m: Floats
+    """(n, 3) its standard deviation along these axes; NaN where nobody stated one."""
     sternum: Mask
     """(n,) where a sensor on the sternum measures the trunk: elsewhere a shoulder's movement may be the
     trunk's."""
@@ -72,6 +74,7 @@ class ArmMotion:
             quality={name: words[rows] for name, words in self.quality.items()},
             positions_m={name: places[rows] for name, places in self.positions_m.items()},
             shoulder_shift_m=self.shoulder_shift_m[rows],
+            shoulder_shift_sd_m=self.shoulder_shift_sd_m[rows],
             sternum=self.sternum[rows],
         )
 
@@ -102,6 +105,7 @@ def arm_motion(skeletons: SkeletonColumns, zero_ns: int = 0) -> ArmMotion:
         quality={name: _at(words, rows, "missing") for name, words in quality.items()},
         positions_m={name: _at(place, rows, np.nan) for name, place in places.items()},
         shoulder_shift_m=_at(shift, rows, np.nan),
+        shoulder_shift_sd_m=_at(skeletons.shoulder_shift_sd_m(), rows, np.nan),
         sternum=_at(skeletons.each(_with_sternum, np.bool_), rows, False),
     )
 

@@ -55,6 +55,8 @@ SMOOTH_GAP_S = 0.1
 0.15, and one of 0.3 s by 0.6."""
 OF_PLACES = ("hand_path", "straightness", "shoulder_shift", "trunk_lean")
 """Of NAMES, what does not come from the exercise's angle."""
+SURE_SD = 2.0
+"""A shoulder that moved by less than so many standard deviations may not have moved."""
 NO_STERNUM = "a sensor on the sternum gives it"
 NO_SHIFT = "two sensors with raw samples on upper arm and forearm give it"
 NO_GOAL = "no goal was set"
@@ -206,18 +208,25 @@ def _of_the_path(around: ArmMotion, way: Way | None, point: Point) -> dict[str, 
 
 
 def _of_the_trunk(part: ArmMotion) -> dict[str, Measure]:
-    shift = part.shoulder_shift_m
-    known = np.isfinite(shift).all(axis=1)
-    moved = np.linalg.norm(shift - shift[known][0], axis=1)[known].max() if known.any() else np.nan
     lean, lean_seen = _lean(part)
     return {
-        "shoulder_shift": (
-            measure(float(moved), "m", kinematics.coverage(part.time_s, known))
-            if known.any()
-            else withheld(NO_SHIFT, "m")
-        ),
+        "shoulder_shift": _moved(part),
         "trunk_lean": (measure(lean, "deg", lean_seen) if part.with_sternum else withheld(NO_STERNUM, "deg")),
     }
+
+
+def _moved(part: ArmMotion) -> Measure:
+    """Return the farthest that the shoulder moved from where it was, unless that may be none."""
+    shift = part.shoulder_shift_m
+    known = np.isfinite(shift).all(axis=1)
+    if not known.any():
+        return withheld(NO_SHIFT, "m")
+    moved = np.linalg.norm(shift - shift[known][0], axis=1)
+    farthest = int(np.nanargmax(moved))
+    coverage = kinematics.coverage(part.time_s, known)
+    if moved[farthest] < SURE_SD * np.linalg.norm(part.shoulder_shift_sd_m[farthest]):
+        return withheld("no more than its own error", "m", coverage)
+    return measure(float(moved[farthest]), "m", coverage)
 
 
 def _lean(part: ArmMotion) -> tuple[float, float]:
