@@ -27,8 +27,9 @@ def test_what_was_meant_last_is_at_the_end_and_each_exercise_keeps_its_limit():
 def test_sets_are_counted_by_whoever_ends_them_and_begin_again_after_the_last():
     plans = Plans()
     numbers = []
+    plans.mean("p01", meant(limit_deg=92.0))
     for _ in range(4):
-        (plan,) = plans.of("p01") or [meant(limit_deg=92.0)]
+        (plan,) = plans.of("p01")
         plans.begun("p01", plan)
         plans.mean("p01", meant(limit_deg=92.0))  # chosen anew on a screen that knows no number
         plans.ended("p01", plan)
@@ -40,9 +41,18 @@ def test_sets_are_counted_by_whoever_ends_them_and_begin_again_after_the_last():
 
 def test_fewer_sets_than_were_done_begin_again():
     plans = Plans()
+    plans.mean("p01", meant())
     plans.ended("p01", meant(set=2))
+    assert [(one.set, one.sets) for one in plans.of("p01")] == [(3, 3)]
     plans.mean("p01", meant(sets=2))
     assert [(one.set, one.sets) for one in plans.of("p01")] == [(1, 2)]
+
+
+def test_a_set_that_nobody_planned_makes_no_plan():
+    plans = Plans()
+    plans.begun("p01", meant(sets=1))
+    plans.ended("p01", meant(sets=1))
+    assert plans.of("p01") == []
 
 
 def test_no_more_is_kept_than_there_can_be():
@@ -56,6 +66,7 @@ def test_no_more_is_kept_than_there_can_be():
 def test_every_screen_is_told_the_plan_of_who_is_shown():
     state = PageState("lab", "p01")
     assert state.state(0)["plans"] == []
+    state.plans.mean("p01", meant(goal_deg=80.0))
     state.begin(meant(goal_deg=85.0, limit_deg=90.0, repetitions=10), 0)
     assert state.state(0)["plans"] == [
         {

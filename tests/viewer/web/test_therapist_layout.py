@@ -79,7 +79,22 @@ def test_the_gauge_is_as_wide_as_its_card_and_grows_with_the_letters(page):
         assert page.evaluate("document.querySelector('#gauge text').getScreenCTM().a") == pytest.approx(
             1.0, abs=0.02
         )
+    for width in (1400, 820, 390, 320):
+        page.set_viewport_size({"width": width, "height": 1000})
+        page.wait_for_timeout(200)
+        edge = box(page, "#gauge")["x"] + box(page, "#gauge")["width"]
+        for text in page.locator("#gauge text").all():
+            found = text.bounding_box()
+            assert found["x"] + found["width"] <= edge + 2, (width, text.text_content())
+        for tab in ("prepare", "exercise", "finish"):
+            assert box(page, f"#tab-{tab}")["height"] < 60, (width, tab)  # in one line
+    page.set_viewport_size({"width": 820, "height": 1000})
+    page.wait_for_timeout(200)
     small = legend()
     page.evaluate("document.documentElement.style.fontSize = '200%'")
     page.wait_for_timeout(300)
     assert legend() == pytest.approx(2.0 * small, rel=0.15)
+    edge = box(page, "#gauge")["x"] + box(page, "#gauge")["width"]
+    for text in page.locator("#gauge text").all():
+        found = text.bounding_box()
+        assert found["x"] + found["width"] <= edge + 2, text.text_content()

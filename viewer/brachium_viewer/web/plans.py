@@ -32,19 +32,20 @@ class Plans:
         self._keep(subject, replace(plan, set=number if number <= plan.sets else 1))
 
     def begun(self, subject: str, begins: ExerciseBegins) -> None:
-        """Take a set that began."""
-        self._keep(subject, begins)
+        """Take a set that began; one that nobody planned, as who trains alone may begin, makes no plan."""
+        if (begins.exercise, begins.side) in self._of.get(subject, {}):
+            self._keep(subject, begins)
 
     def ended(self, subject: str, begins: ExerciseBegins) -> None:
         """Take a set that ended: the next one follows, after the last the first again."""
-        kept = self._of.get(subject, {}).get((begins.exercise, begins.side), begins)
-        number = begins.set + 1 if begins.set < kept.sets else 1
-        self._of.setdefault(subject, {})[begins.exercise, begins.side] = replace(kept, set=number)
+        mine, key = self._of.get(subject, {}), (begins.exercise, begins.side)
+        if key in mine:
+            mine[key] = replace(mine[key], set=begins.set + 1 if begins.set < mine[key].sets else 1)
 
     def over(self, subject: str) -> None:
         """Take the end of a session: sets are counted from one again; goals and limits stay."""
         mine = self._of.get(subject, {})
-        self._of[subject] = {key: replace(plan, set=1) for key, plan in mine.items()}
+        mine.update({key: replace(plan, set=1) for key, plan in mine.items()})
 
     def _keep(self, subject: str, plan: ExerciseBegins) -> None:
         mine = self._of.setdefault(subject, {})

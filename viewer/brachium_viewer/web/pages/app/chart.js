@@ -59,7 +59,7 @@ export class Chart {
         cursor: { show: false },
         scales: { x: { time: false }, y: { range: () => this.range() } },
         axes: [
-          { ...axis, size: 26 * this.unit, values: (plot, ticks) => ticks.map((at) => `${number(at).replace("-", "−")} s`) },
+          { ...axis, size: 26 * this.unit, space: 50 * this.unit, values: (plot, ticks) => ticks.map((at) => `${number(at).replace("-", "−")} s`) },
           { ...axis, size: 46 * this.unit, space: 24 * this.unit, values: (plot, ticks) => ticks.map((at) => `${number(at).replace("-", "−")}°`) },
         ],
         series: [

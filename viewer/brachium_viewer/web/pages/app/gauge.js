@@ -10,6 +10,7 @@ const HIGH = 18;
 const ABOVE = 15; // where words stand
 const BELOW = 62;
 const ROW = 17;
+const LETTER = 7.4; // of width
 const WORDS = 150; // two words nearer than this would touch
 const SVG = "http://www.w3.org/2000/svg";
 
@@ -18,6 +19,16 @@ function element(name, words, text) {
   for (const [key, value] of Object.entries(words)) one.setAttribute(key, value);
   if (text !== undefined) one.textContent = text;
   return one;
+}
+
+/** A text in lines of so many letters. */
+function broken(text, letters) {
+  return text.split(" ").reduce((lines, word) => {
+    const last = lines.at(-1);
+    if (last !== undefined && last.length + 1 + word.length <= letters) lines[lines.length - 1] = `${last} ${word}`;
+    else lines.push(word);
+    return lines;
+  }, []);
 }
 
 export class Gauge {
@@ -64,8 +75,10 @@ export class Gauge {
     if (need != null) this.tick("need", need, say("need"), close ? BELOW + ROW : BELOW);
     const rows = close ? 2 : limit != null || need != null ? 1 : 0;
     const legend = band ? say("reference.range", { low: number(band[0]), high: number(band[1]) }) : say("reference.none");
-    add("text", { x: 0, y: BELOW + rows * ROW }, legend);
-    this.svg.setAttribute("viewBox", `0 0 ${Math.max(this.wide, 1)} ${BELOW + rows * ROW + 6}`);
+    const lines = broken(legend, this.wide / LETTER);
+    const first = BELOW + rows * ROW;
+    lines.forEach((line, i) => add("text", { x: 0, y: first + i * ROW }, line));
+    this.svg.setAttribute("viewBox", `0 0 ${Math.max(this.wide, 1)} ${first + (lines.length - 1) * ROW + 6}`);
     this.now = element("path", { class: "now" });
     this.svg.append(this.now);
     this.svg.setAttribute("aria-label", legend);

@@ -17,6 +17,7 @@ import { language, say, sayCount, speak, told } from "./words.js";
 const UNCOUNTED = new Set(["uncalibrated", "heading_assumed", "assumed"]);
 
 let state = null;
+let arms = {};
 let up = false;
 let again = false; // the next state is the first that this line tells
 let next = null; // the button that gets the focus as soon as it is there
@@ -46,7 +47,8 @@ function line(now) {
 }
 
 function frame(message) {
-  showParts(message.arms);
+  arms = message.arms;
+  showParts(arms);
   numbers.frame(message);
   picture.show(message.arms, message.set?.over ? numbers.side : null);
   hint();
@@ -79,7 +81,7 @@ function news(message) {
     numbers.ended = null;
     clearRatings();
   }
-  if (!state && (message.set || message.recording.state === "on")) tabs.show($("tab-exercise"));
+  if (!state && message.set) tabs.show($("tab-exercise"));
   if (again && state?.set && !message.set) tell($("action-said"), { ok: false, reason: say("line.anew") });
   again = false;
   state = message;
@@ -106,11 +108,16 @@ function lead(button) {
   if (button && !next) button.focus({ preventScroll: true });
 }
 
+/** Whether anything comes that can be recorded. */
+function heard() {
+  return state.live > 0 || Object.values(arms).some((arm) => !arm.stale);
+}
+
 function recording() {
   const { state: how, seconds } = state.recording;
   $("recording").hidden = how !== "on" || !up; // cut off, nobody knows whether it still does
   const time = `${Math.floor((seconds ?? 0) / 60)}:${String((seconds ?? 0) % 60).padStart(2, "0")}`;
-  $("recording").textContent = say(state.live || !state.sensors.length ? "recording" : "recording.silent", { time });
+  $("recording").textContent = say(heard() ? "recording" : "recording.silent", { time });
   const alarms = state.alarms.map(({ what, reason }) => say(`alarm.${what}`, { reason: told(reason) }));
   if (state.stopped) alarms.unshift(stopSaid(state.stopped));
   renew($("alarm"), alarms.join(), () => alarms.map((text) => make("p", {}, text)));
@@ -138,6 +145,7 @@ function history() {
 
 $("start").addEventListener("click", async () => {
   tabs.show($("tab-exercise"));
+  plan.tell(); // what was never changed is planned by starting it
   const answer = await busy($("start"), () => link.ask("exercise", { ...plan.words, set: plan.number }));
   numbers.ended = null;
   tell($("action-said"), answer);

@@ -1,0 +1,88 @@
+"""What a therapist must know is said where the eye is: at Start, at the names, on the sign of the recording."""
+
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import pytest
+from msgspec.structs import replace
+
+from brachium_wire import keys
+from brachium_wire.bus import Bus
+from brachium_wire.codec import encode
+from brachium_wire.messages import Info
+
+sync_api = pytest.importorskip("playwright.sync_api")
+
+pytestmark = [pytest.mark.network, pytest.mark.browser]
+
+PATIENCE_MS = 20_000
+
+
+def holds(page: Any, identity: str, text: str) -> None:
+    sync_api.expect(page.locator(identity)).to_contain_text(text, timeout=PATIENCE_MS)
+
+
+@contextmanager
+def arm(endpoint: str, arm_at: Callable[..., Any], quality: str) -> Iterator[Bus]:
+    """An arm that moves and whose elbow is of this quality, and a sensor of somebody else."""
+    stop = threading.Event()
+    with Bus.open(endpoint) as bus:
+        for subject in ("p01", "p02"):
+            info = Info(node=subject, rate_hz=100.0, origin="emulated", host="h")
+            bus.retain(keys.info("lab", subject, "forearm_r"), encode(info))
+
+        def move() -> None:
+            number = 0
+            while not stop.wait(0.02):
+                number += 1
+                skeleton = replace(arm_at(0.02 * number), assumed={"elbow_flexion": quality})
+                bus.put(keys.skeleton("lab", "p01", "right"), encode(skeleton))
+
+        thread = threading.Thread(target=move)
+        thread.start()
+        try:
+            yield bus
+        finally:
+            stop.set()
+            thread.join(5.0)
+
+
+@pytest.fixture
+def page(browser, serve_pages, router_endpoint, tmp_path) -> Iterator[Any]:
+    with serve_pages(endpoint=router_endpoint, sessions=tmp_path, open_door=True, subject="p01") as serving:
+        page = browser.new_context(locale="en-GB", viewport={"width": 1400, "height": 900}).new_page()
+        page.goto(serving.address)
+        yield page
+        page.close()
+
+
+def test_that_nothing_will_be_counted_is_said_at_start(page, router_endpoint, arm_at):
+    hint = page.locator("#action-hint")
+    with arm(router_endpoint, arm_at, "uncalibrated"):
+        holds(page, "#action-hint", "Not calibrated: repetitions are not counted.")
+        page.click("#start")
+        holds(page, "#recording", "Recording")
+        sync_api.expect(hint).to_be_visible()
+        page.click("#language")
+        holds(page, "#action-hint", "Nicht kalibriert: Wiederholungen werden nicht gezählt.")
+    with arm(router_endpoint, arm_at, "good"):
+        sync_api.expect(hint).to_be_hidden(timeout=PATIENCE_MS)
+
+
+def test_a_refusal_stands_at_the_names_and_an_empty_recording_says_that_it_is(page, router_endpoint, arm_at):
+    with arm(router_endpoint, arm_at, "good"):
+        holds(page, "#angle-value", "°")
+        page.click("#start")
+        holds(page, "#recording", "Recording")
+        page.click("#stop")
+        page.click("#subject")
+        page.locator("#subject-list button", has_text="p02").click()
+        holds(page, "#subjects-said", "a session of p01 is recorded: end it first, under Finish")
+        sync_api.expect(page.locator("#create-said")).to_have_text("")
+        said, form = (page.locator(one).bounding_box()["y"] for one in ("#subjects-said", "#create"))
+        assert said < form
+        page.click("#subjects-close")
+        sync_api.expect(page.locator("#recording")).not_to_contain_text("without data")
+    holds(page, "#recording", "without data: no sensor is live")
