@@ -1,11 +1,14 @@
 """What is to be done is kept for every screen: what was chosen, and which set is next."""
 
+from typing import Any
+
+from brachium_body.segments import Side
 from brachium_viewer.marks import ExerciseBegins
 from brachium_viewer.web.page_state import PageState
 from brachium_viewer.web.plans import MOST, Plans
 
 
-def meant(exercise: str = "elbow-flexion", side: str = "right", **words: object) -> ExerciseBegins:
+def meant(exercise: str = "elbow-flexion", side: Side = "right", **words: Any) -> ExerciseBegins:
     return ExerciseBegins(exercise=exercise, side=side, **{"sets": 3, **words})
 
 

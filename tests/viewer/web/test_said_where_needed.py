@@ -1,4 +1,4 @@
-"""What a therapist must know is said where the eye is: at Start, at the names, on the sign of the recording."""
+"""What a therapist must know is said where the eye is: at Start, at the names, beside the recording."""
 
 import threading
 from collections.abc import Callable, Iterator
