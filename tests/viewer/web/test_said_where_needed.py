@@ -86,3 +86,39 @@ def test_a_refusal_stands_at_the_names_and_an_empty_recording_says_that_it_is(pa
         page.click("#subjects-close")
         sync_api.expect(page.locator("#recording")).not_to_contain_text("without data")
     holds(page, "#recording", "without data: no sensor is live")
+
+
+def test_parts_that_fare_alike_are_called_so_once(page):
+    named = page.evaluate("""async () => {
+        const { showParts } = await import("/app/sensors.js");
+        const arm = (...qualities) => ({
+            stale: false,
+            parts: { upper_arm: qualities[0], forearm: qualities[1], hand: qualities[2] },
+        });
+        const said = (arms) => {
+            showParts(arms);
+            return [...document.querySelectorAll("#parts li")].map((one) => one.textContent);
+        };
+        const none = arm("uncalibrated", "uncalibrated", "uncalibrated");
+        return [said({ right: none, left: none }), said({ right: arm("good", "held", "held") })];
+    }""")
+    assert named == [["All parts: not calibrated"], ["Upper arm", "Forearm, Hand: held"]]
+
+
+def test_that_a_goal_was_moved_is_in_sight_on_a_low_screen(page, router_endpoint, arm_at):
+    with arm(router_endpoint, arm_at, "good"):
+        holds(page, "#angle-value", "°")
+        for size in ((1180, 820), (1100, 720), (820, 1180), (390, 844)):
+            page.set_viewport_size({"width": size[0], "height": size[1]})
+            page.click("#tab-exercise")
+            if page.is_checked("#use-limit"):
+                page.uncheck("#use-limit")
+            page.fill("#plan-goal", "120")
+            page.check("#use-limit")
+            holds(page, "#plan-said", "Goal moved to 85°")
+            said, panel, actions = (
+                page.locator(one).bounding_box() for one in ("#plan-said", "#panel", "#actions")
+            )
+            assert said["y"] + said["height"] <= min(panel["y"] + panel["height"], actions["y"], size[1]), (
+                size
+            )

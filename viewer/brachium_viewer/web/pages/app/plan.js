@@ -29,6 +29,7 @@ export class Plan {
     this.changed = () => {
       if (!this.ready || this.filling) return;
       this.within();
+      if ($("plan-said").textContent) $("plan-said").scrollIntoView({ block: "nearest" });
       changed();
       this.tell();
     };

@@ -91,7 +91,7 @@ export function showParts(arms) {
       ...good.map(([, part]) => entry(part, say(`part.${part}`))),
       ...[...doubtful].map(([quality, names]) => {
         const known = has(`quality.${quality}`) ? `: ${say(`quality.${quality}`)}` : "";
-        return entry("not", names.join(", ") + known);
+        return entry("not", (names.length > 1 && names.length === rows.length ? say("part.all") : names.join(", ")) + known);
       }),
     ];
   });
