@@ -161,7 +161,7 @@ def test_who_was_under_way_when_it_began_to_be_seen_has_no_way_there(motion_of) 
     assert found[1].measures["movement_time"].value == pytest.approx(1.0, abs=0.05)
 
 
-@pytest.mark.parametrize("gap_s", [0.06, 0.1, 0.16, 0.44])
+@pytest.mark.parametrize("gap_s", [0.06, 0.12, 0.2, 0.26, 0.44])
 def test_smoothness_is_withheld_where_a_gap_may_hide_a_jerk(motion_of, gap_s: float) -> None:
     t, angle = curls(seconds=2.5)
     for begin in (0.1, 0.7, 1.2, 1.9):
@@ -173,7 +173,7 @@ def test_smoothness_is_withheld_where_a_gap_may_hide_a_jerk(motion_of, gap_s: fl
         for one in set_measures(motion, CURL).repetitions:
             assert one.measures["movement_time"].value == pytest.approx(2.5, rel=0.05)
             smooth = [one.measures[name] for name in ("sparc", "ldlj")]
-            if gap_s > 0.11:
+            if gap_s > 0.21:
                 assert all("a gap of 0." in m.withheld for m in smooth)
             else:
                 assert smooth[0].value == pytest.approx(GOLDEN_SPARC, abs=0.01)

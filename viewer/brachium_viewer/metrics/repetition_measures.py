@@ -50,9 +50,9 @@ ABOUT_S = 0.5
 """About the instant of its base an arm rests."""
 AROUND_S = 2.0
 """So much before and after a repetition is looked at for where its way there begins and ends."""
-SMOOTH_GAP_S = 0.1
-"""A longer gap in the way there may hide a jerk. So long a one makes LDLJ of a smooth reach wrong by up to
-0.15, and one of 0.3 s by 0.6."""
+SMOOTH_GAP_S = 0.2
+"""A longer gap in the way there may hide a jerk. So long a one changes LDLJ of a reach of 0.8 to 1 s by at
+most 0.07, one of 0.3 s by 0.18; of longer reaches noise changes it by more than either."""
 OF_PLACES = ("hand_path", "straightness", "shoulder_shift", "trunk_lean")
 """Of NAMES, what does not come from the exercise's angle."""
 SURE_SD = 2.0
