@@ -133,6 +133,9 @@ class SessionDesk:
     def _start(self, bus: Bus, subject: str) -> None:
         before, self.failure = self.failure, ""
         self._stop, self._closed = threading.Event(), None
+        deadline = time.monotonic() + READY_S
+        while bus.alive(self._token) and time.monotonic() < deadline:  # of the recording before
+            time.sleep(LOOK_S)
         thread = threading.Thread(target=self._run, args=(subject, self._stop), name="recorder")
         thread.start()
         deadline = time.monotonic() + READY_S
