@@ -49,7 +49,9 @@ def stamp(measured: Measured, memory: Memory, place: SegmentMemory, received_ns:
         raise WireError(Drop.TIME_BACKWARDS, f"batch/1: t {batch.device_us} is not after the sample before")
     if not clock.known:
         clock.arrival(newest_us, received_ns)
-    times, uncertainty_ns = clock.host_times(device_us), clock.uncertainty_ns(newest_us)
+    times = clock.host_times(device_us)
+    # While a correction fades the first sample is less certain than the last; between them none is less than both.
+    uncertainty_ns = max(clock.uncertainty_ns(device_us[0]), clock.uncertainty_ns(newest_us))
     if times[0] <= 0 or times[-1] > received_ns + uncertainty_ns + MAX_AHEAD_NS:
         raise WireError(Drop.OUT_OF_RANGE, f"batch/1: t {batch.device_us} lies in the future")
     if in_order:
