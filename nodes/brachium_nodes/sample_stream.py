@@ -50,7 +50,7 @@ def stamp(measured: Measured, memory: Memory, place: SegmentMemory, received_ns:
     if not clock.known:
         clock.arrival(newest_us, received_ns)
     times = clock.host_times(device_us)
-    # While a correction fades the first sample is less certain than the last; between them none is less than both.
+    # While a correction fades the first sample is the less certain one; none between is less than both.
     uncertainty_ns = max(clock.uncertainty_ns(device_us[0]), clock.uncertainty_ns(newest_us))
     if times[0] <= 0 or times[-1] > received_ns + uncertainty_ns + MAX_AHEAD_NS:
         raise WireError(Drop.OUT_OF_RANGE, f"batch/1: t {batch.device_us} lies in the future")
