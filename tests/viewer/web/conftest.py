@@ -8,12 +8,13 @@ from contextlib import AbstractContextManager, contextmanager
 
 import aiohttp
 import pytest
+from msgspec.structs import replace
 
 from brachium_viewer.web import server
 from brachium_wire import keys
 from brachium_wire.bus import Bus
 from brachium_wire.codec import encode
-from brachium_wire.messages import Calibration, Info
+from brachium_wire.messages import Calibration, Info, Quality
 
 START_S = 40.0
 
@@ -109,10 +110,18 @@ def watch() -> Callable[..., None]:
 
 @pytest.fixture
 def wear(router_endpoint: str, arm_at) -> Callable[..., AbstractContextManager[str]]:
-    """A router beside which an arm with such sensors swings, at 50 Hz, as a context manager; its endpoint."""
+    """A router beside which an arm with such sensors swings, at 50 Hz, as a context manager; its endpoint.
+
+    `assumed` is what each skeleton says of its angles' quality.
+    """
 
     @contextmanager
-    def worn(*segments: str, speed: float = 1.0, calibration: Calibration | None = None) -> Iterator[str]:
+    def worn(
+        *segments: str,
+        speed: float = 1.0,
+        calibration: Calibration | None = None,
+        assumed: dict[str, Quality] | None = None,
+    ) -> Iterator[str]:
         stop = threading.Event()
 
         def publish() -> None:
@@ -125,13 +134,16 @@ def wear(router_endpoint: str, arm_at) -> Callable[..., AbstractContextManager[s
                 number = 0
                 while not stop.wait(0.02):
                     number += 1
-                    bus.put(keys.skeleton("lab", "p01", "right"), encode(arm_at(0.02 * speed * number)))
+                    skeleton = replace(arm_at(0.02 * speed * number), assumed=assumed or {})
+                    bus.put(keys.skeleton("lab", "p01", "right"), encode(skeleton))
 
         thread = threading.Thread(target=publish)
         thread.start()
-        yield router_endpoint
-        stop.set()
-        thread.join(5.0)
+        try:
+            yield router_endpoint
+        finally:
+            stop.set()
+            thread.join(5.0)
 
     return worn
 

@@ -1,12 +1,9 @@
 """What a therapist must know is said where the eye is: at Start, at the names, beside the recording."""
 
-import threading
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Iterator
 from typing import Any
 
 import pytest
-from msgspec.structs import replace
 
 from brachium_wire import keys
 from brachium_wire.bus import Bus
@@ -24,31 +21,6 @@ def holds(page: Any, identity: str, text: str) -> None:
     sync_api.expect(page.locator(identity)).to_contain_text(text, timeout=PATIENCE_MS)
 
 
-@contextmanager
-def arm(endpoint: str, arm_at: Callable[..., Any], quality: str) -> Iterator[Bus]:
-    """An arm that moves and whose elbow is of this quality, and a sensor of somebody else."""
-    stop = threading.Event()
-    with Bus.open(endpoint) as bus:
-        for subject in ("p01", "p02"):
-            info = Info(node=subject, rate_hz=100.0, origin="emulated", host="h")
-            bus.retain(keys.info("lab", subject, "forearm_r"), encode(info))
-
-        def move() -> None:
-            number = 0
-            while not stop.wait(0.02):
-                number += 1
-                skeleton = replace(arm_at(0.02 * number), assumed={"elbow_flexion": quality})
-                bus.put(keys.skeleton("lab", "p01", "right"), encode(skeleton))
-
-        thread = threading.Thread(target=move)
-        thread.start()
-        try:
-            yield bus
-        finally:
-            stop.set()
-            thread.join(5.0)
-
-
 @pytest.fixture
 def page(browser, serve_pages, router_endpoint, tmp_path) -> Iterator[Any]:
     with serve_pages(endpoint=router_endpoint, sessions=tmp_path, open_door=True, subject="p01") as serving:
@@ -58,21 +30,23 @@ def page(browser, serve_pages, router_endpoint, tmp_path) -> Iterator[Any]:
         page.close()
 
 
-def test_that_nothing_will_be_counted_is_said_at_start(page, router_endpoint, arm_at):
+def test_that_nothing_will_be_counted_is_said_at_start(page, wear):
     hint = page.locator("#action-hint")
-    with arm(router_endpoint, arm_at, "uncalibrated"):
+    with wear("forearm_r", assumed={"elbow_flexion": "uncalibrated"}):
         holds(page, "#action-hint", "Not calibrated: repetitions are not counted.")
         page.click("#start")
         holds(page, "#recording", "Recording")
         sync_api.expect(hint).to_be_visible()
         page.click("#language")
         holds(page, "#action-hint", "Nicht kalibriert: Wiederholungen werden nicht gezählt.")
-    with arm(router_endpoint, arm_at, "good"):
+    with wear("forearm_r"):
         sync_api.expect(hint).to_be_hidden(timeout=PATIENCE_MS)
 
 
-def test_a_refusal_stands_at_the_names_and_an_empty_recording_says_that_it_is(page, router_endpoint, arm_at):
-    with arm(router_endpoint, arm_at, "good"):
+def test_a_refusal_stands_at_the_names_and_an_empty_recording_says_that_it_is(page, wear):
+    with wear("forearm_r") as endpoint, Bus.open(endpoint) as bus:
+        other = Info(node="other", rate_hz=100.0, origin="emulated", host="h")
+        bus.retain(keys.info("lab", "p02", "forearm_r"), encode(other))
         holds(page, "#angle-value", "°")
         page.click("#start")
         holds(page, "#recording", "Recording")
@@ -105,8 +79,8 @@ def test_parts_that_fare_alike_are_called_so_once(page):
     assert named == [["All parts: not calibrated"], ["Upper arm", "Forearm, Hand: held"]]
 
 
-def test_that_a_goal_was_moved_is_in_sight_on_a_low_screen(page, router_endpoint, arm_at):
-    with arm(router_endpoint, arm_at, "good"):
+def test_that_a_goal_was_moved_is_in_sight_on_a_low_screen(page, wear):
+    with wear("forearm_r"):
         holds(page, "#angle-value", "°")
         for size in ((1180, 820), (1100, 720), (820, 1180), (390, 844)):
             page.set_viewport_size({"width": size[0], "height": size[1]})
