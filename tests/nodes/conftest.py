@@ -1,12 +1,16 @@
+import json
 import os
 import socket
+import subprocess
 import threading
 import time
 from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
 
 import pytest
 
-from brachium_nodes.firmware_build import Build, NoMicroPython, build
+from brachium_nodes.firmware_build import Build, NoMicroPython, build, micropython
 from brachium_nodes.gateway import GatewaySettings, run
 from brachium_nodes.roster import NodeEntry
 from brachium_wire import keys
@@ -146,3 +150,28 @@ def firmware(tmp_path_factory: pytest.TempPathFactory) -> Build:
         if os.environ.get("CI") == "true":
             pytest.fail(str(error))
         pytest.skip(str(error))
+
+
+HEAD = """
+import json, sys
+sys.path.insert(0, sys.argv[1])
+with open('given.json') as file:
+    given = json.load(file)
+"""
+
+
+@pytest.fixture
+def on_chip(firmware, tmp_path: Path) -> Callable[..., Any]:
+    """Run a few lines on MicroPython; they find `given` and say their answer as JSON."""
+
+    def run(lines: str, given: object = None, files: dict[str, object] | None = None) -> Any:
+        for name, content in {"given.json": given, **(files or {})}.items():
+            (tmp_path / name).write_text(json.dumps(content))
+        program = tmp_path / "program.py"
+        program.write_text(HEAD + lines)
+        words = [*micropython(), str(program), str(firmware.firmware)]
+        done = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, timeout=60, check=False)
+        assert done.returncode == 0, done.stdout + done.stderr
+        return json.loads(done.stdout.strip().splitlines()[-1])
+
+    return run

@@ -3,42 +3,11 @@
 import hashlib
 import hmac
 import json
-import subprocess
-from collections.abc import Callable
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
 
 import msgpack
 import pytest
-
-from brachium_nodes.firmware_build import micropython
-
-Run = Callable[..., Any]
-
-HEAD = """
-import json, sys
-sys.path.insert(0, sys.argv[1])
-with open('given.json') as file:
-    given = json.load(file)
-"""
-
-
-@pytest.fixture
-def on_chip(firmware, tmp_path: Path) -> Run:
-    """Run a few lines on MicroPython; they find `given` and say their answer as JSON."""
-
-    def run(lines: str, given: object = None, files: dict[str, object] | None = None) -> Any:
-        for name, content in {"given.json": given, **(files or {})}.items():
-            (tmp_path / name).write_text(json.dumps(content))
-        program = tmp_path / "program.py"
-        program.write_text(HEAD + lines)
-        words = [*micropython(), str(program), str(firmware.firmware)]
-        done = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, timeout=60, check=False)
-        assert done.returncode == 0, done.stdout + done.stderr
-        return json.loads(done.stdout.strip().splitlines()[-1])
-
-    return run
 
 
 def test_maps_are_written_as_messagepack_has_them(on_chip):

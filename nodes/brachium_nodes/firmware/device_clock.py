@@ -63,11 +63,17 @@ class SampleClock:
         self._newest = taken if taken > self._newest else self._newest + 1
         return self._newest
 
+    def count(self, elapsed):
+        """Return how many samples are taken in that many us, none begun left out."""
+        return (elapsed << FRACTION) // self.period + 1
+
     def due_between(self, before, after):
-        """Return whether a sample is taken between two readings of the clock."""
+        """Return whether a sample may be taken between two readings of the clock, or too near to tell."""
         if self._phase is None:
             return False
-        first, last = (((t - self._at) << FRACTION) - self._phase for t in (before, after))
+        near = self.period // 8
+        first = ((before - self._at) << FRACTION) - self._phase - near
+        last = ((after - self._at) << FRACTION) - self._phase + near
         return first // self.period != last // self.period
 
     def skip(self, now):

@@ -6,7 +6,7 @@ import time
 CHIPS = {0x47: "ICM-42688-P"}
 _RATES = ((200, 0x7), (100, 0x8), (50, 0x9), (25, 0xA))
 _PACKET = 16  # header, acceleration, rate, temperature, time stamp
-_ROOM = 2048
+_SIZE = 2048
 
 
 class Driver:
@@ -17,6 +17,7 @@ class Driver:
     acc_step = 9.80665 / 4096  # m/s^2, at 8 g
     gyr_step = 0.017453293 / 16.4  # rad/s, at 2000 deg/s
     mag_step = None
+    room = _SIZE // _PACKET
 
     def __init__(self, bus, address, who):
         self._bus, self._address, self.chip = bus, address, CHIPS[who]
@@ -46,7 +47,7 @@ class Driver:
         """Return how many samples wait, or -1 when some were lost: then call `empty`."""
         self._bus.readfrom_mem_into(self._address, 0x2E, self._two)
         (size,) = struct.unpack(">H", self._two)
-        if size > _ROOM - _PACKET or size % _PACKET:
+        if size > _SIZE - _PACKET or size % _PACKET:
             return -1
         return size // _PACKET
 

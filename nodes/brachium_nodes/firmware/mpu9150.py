@@ -1,8 +1,8 @@
 """MPU-9150 and MPU-9250: inertial sensor with FIFO, and the AK8975 or AK8963 magnetometer behind it.
 
 Registers and figures are those of the makers' register maps. Every driver has the same few names: chip,
-big_endian, magnetometer, acc_step, gyr_step, mag_step, start, empty, gathered, read and field; in all of
-these the bus may raise OSError.
+big_endian, magnetometer, acc_step, gyr_step, mag_step, room (samples that fit in the FIFO), start, empty,
+gathered, read and field; in all of these the bus may raise OSError.
 """
 
 import struct
@@ -26,7 +26,8 @@ class Driver:
     def __init__(self, bus, address, who):
         self._bus, self._address, self.chip = bus, address, CHIPS[who]
         self._old = self.chip == "MPU-9150"
-        self._room = 1024 if self._old else 512
+        self._size = 1024 if self._old else 512
+        self.room = self._size // _SAMPLE
         self._one, self._two = bytearray(1), bytearray(2)
         self._compass = bytearray(8)  # ST1, three axes, ST2
         self._begun = 0
@@ -68,7 +69,7 @@ class Driver:
         """Return how many samples wait, or -1 when some were lost: then call `empty`."""
         self._bus.readfrom_mem_into(self._address, 0x72, self._two)
         (size,) = struct.unpack(">H", self._two)
-        if size > self._room - _SAMPLE or size % _SAMPLE:
+        if size > self._size - _SAMPLE or size % _SAMPLE:
             return -1  # full, or a broken transfer has left part of a sample
         return size // _SAMPLE
 

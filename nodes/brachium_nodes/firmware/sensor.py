@@ -46,7 +46,7 @@ class Sensor:
         if self.clock is None:
             self.rate_hz, self.clock = rate_hz, self._make_clock(rate_hz)
         else:
-            self.clock.skip(now())
+            self._broken = True  # nobody knows which samples the start has thrown away
         self._heard = now()
 
     def poll(self, now):
@@ -78,14 +78,15 @@ class Sensor:
         before = now()
         waiting = driver.gathered()
         if waiting < 0:
-            self.overflows += 1
-            self._broken = True
-            self._poll(now)
+            self._overflow(now)
             return
         clock.read(before, now(), waiting)
         while waiting:
             part = memoryview(self._data)[: 12 * min(waiting, READ_AT_ONCE)]
             self._read(part)
+            if waiting + clock.count(now() - before) >= driver.room:
+                self._overflow(now)  # since they were counted: what was read may not be the oldest
+                return
             field = self._new_field()
             for at in range(0, len(part), 12):
                 number = clock.number
@@ -93,6 +94,11 @@ class Sensor:
                 field = None
             waiting -= len(part) // 12
             self._heard = now()
+
+    def _overflow(self, now):
+        self.overflows += 1
+        self._broken = True
+        self._poll(now)
 
     def _new_field(self):
         """Return the field at the oldest sample just read; a refusal must not cost the samples."""
