@@ -48,9 +48,14 @@ PAPER: Mapping[str, Range] = {
 FUNCTIONAL: Mapping[str, Range] = {
     "shoulder_flexion": Range(-46.0, 121.0),
     "shoulder_abduction": Range(None, 128.0),
+    "elbow_flexion": Range(30.0, 130.0),
+    "forearm_pronation": Range(-50.0, 50.0),
+    "wrist_flexion": Range(-40.0, 40.0),
 }
-"""What daily activities need (Namdari 2012, means). Its cross-body adduction of 116 deg has no column
-here."""
+"""What most daily activities need: shoulder Namdari 2012 (means), elbow and forearm Morrey 1981, wrist Ryu 1991.
+
+Namdari's cross-body adduction of 116 deg has no column here; of the wrist's deviation Ryu states only both
+directions together (40 deg)."""
 
 PLAUSIBLE: Mapping[str, Range] = {
     "shoulder_rotation": Range(-110.0, 110.0),

@@ -167,7 +167,8 @@ def test_everything_told_is_json(fed):
 
 def test_exercises_of_the_shoulder_are_held_against_their_movements_reference():
     rows = {row["name"]: row for row in frames.hello("lab")["exercises"]}
-    assert (rows["elbow-flexion"]["band"], rows["elbow-flexion"]["need"]) == ([0.0, 150.0], None)
+    assert (rows["elbow-flexion"]["band"], rows["elbow-flexion"]["need"]) == ([0.0, 150.0], 130.0)
+    assert rows["elbow-extension"]["need"] == 30.0
     assert (rows["shoulder-flexion"]["band"], rows["shoulder-flexion"]["need"]) == ([0.0, 180.0], 121.0)
     assert (rows["shoulder-abduction"]["band"], rows["shoulder-abduction"]["need"]) == ([0.0, 180.0], 128.0)
     assert (rows["shoulder-extension"]["band"], rows["shoulder-extension"]["need"]) == ([0.0, 60.0], 46.0)

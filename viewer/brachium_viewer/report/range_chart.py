@@ -42,7 +42,7 @@ LEGEND: Mapping[str, str] = {
     "other": "other side",
     "last": "last session",
     "reference": "AAOS reference",
-    "need": "daily activities (Namdari 2012)",
+    "need": "needed by daily activities",
 }
 """By a bar's ends."""
 

@@ -160,7 +160,7 @@ def _bands(row: Exercise) -> tuple[list[float | None] | None, float | None]:
     """
     if row.angle in REFERENCE:
         need = FUNCTIONAL.get(row.angle)
-        return _pair(REFERENCE[row.angle]), None if need is None else need.high
+        return _pair(REFERENCE[row.angle]), None if need is None else need.high if row.rises else need.low
     if row.plane == "extension":
         low, needed = REFERENCE["shoulder_flexion"].low, FUNCTIONAL["shoulder_flexion"].low
         return [0.0, None if low is None else -low], None if needed is None else -needed
