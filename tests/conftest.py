@@ -19,7 +19,8 @@ from brachium_router import config
 settings.register_profile("any-machine", deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("any-machine")
 
-ENDED_WITHIN_S = 15.0
+PATIENCE_S = 60.0
+"""A test waits for what it asks for, not for a time: this long only when it has failed."""
 
 _ROUTER = """
 import sys, zenoh
@@ -52,7 +53,7 @@ class RouterProcess:
     def stop(self) -> None:
         if self._process is not None:
             self._process.kill()
-            self._process.communicate(timeout=ENDED_WITHIN_S)
+            self._process.communicate(timeout=PATIENCE_S)
             self._process = None
 
 
@@ -87,4 +88,7 @@ def browser() -> Iterator[Any]:
             one = stack.enter_context(chromium())
         except Failed as missing:
             (pytest.fail if os.environ.get("CI") == "true" else pytest.skip)(str(missing))
+        from playwright.sync_api import expect
+
+        expect.set_options(timeout=1000 * PATIENCE_S)
         yield one

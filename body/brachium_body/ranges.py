@@ -52,7 +52,7 @@ FUNCTIONAL: Mapping[str, Range] = {
     "forearm_pronation": Range(-50.0, 50.0),
     "wrist_flexion": Range(-40.0, 40.0),
 }
-"""What most daily activities need: shoulder Namdari 2012 (means), elbow and forearm Morrey 1981, wrist Ryu 1991.
+"""What most daily activities need: shoulder Namdari 2012 (means), elbow, forearm Morrey 1981, wrist Ryu 1991.
 
 Namdari's cross-body adduction of 116 deg has no column here; of the wrist's deviation Ryu states only both
 directions together (40 deg)."""

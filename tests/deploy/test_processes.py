@@ -84,7 +84,7 @@ def test_what_refuses_its_input_or_never_came_up_is_hopeless(
     children.start("other", [SLEEP])
     child = children.start("one", [f"raise SystemExit({code})"])
     child.came_up = came_up
-    assert child.process.wait(30) == code
+    assert child.process.wait(60) == code
     assert children.hopeless() is (child if expected else None)
 
 
@@ -137,7 +137,7 @@ def test_one_that_does_not_end_is_killed(
 def test_its_last_words_are_kept(children: Processes, tmp_path: Path):
     err = tmp_path / "err"
     child = children.start("one", ["import sys; sys.exit('first\\nport 7447 is taken')"], stderr=err)
-    assert child.process.wait(30) == 1
+    assert child.process.wait(60) == 1
     assert child.complaint() == "port 7447 is taken"
 
 

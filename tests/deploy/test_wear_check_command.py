@@ -327,11 +327,11 @@ class Fusion:
 
     def __enter__(self) -> None:
         self._thread.start()
-        assert self._ready.wait(10)
+        assert self._ready.wait(60.0)
 
     def __exit__(self, *_: object) -> None:
         self._stop.set()
-        self._thread.join(10)
+        self._thread.join(60.0)
         assert not self._thread.is_alive()
 
     def _run(self) -> None:

@@ -104,7 +104,7 @@ class Fusion:
     def end(self) -> float:
         begun = time.monotonic()
         self.stop.set()
-        self._thread.join(timeout=10.0)
+        self._thread.join(timeout=60.0)
         assert not self._thread.is_alive()
         assert self.error is None, self.error
         return time.monotonic() - begun

@@ -18,7 +18,7 @@ from brachium_wire.bus import Bus
 from brachium_wire.codec import WireError, decode_topic
 from brachium_wire.messages import Health, Status
 
-DEADLINE_S = 15.0
+DEADLINE_S = 60.0
 ROOM = "test"
 
 
@@ -120,7 +120,7 @@ class Running:
 
     def end(self) -> None:
         self.stop.set()
-        self._thread.join(timeout=5)
+        self._thread.join(timeout=60.0)
         assert not self._thread.is_alive(), "the gateway did not end within 5 s"
         assert self.error is None, self.error
 

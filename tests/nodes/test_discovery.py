@@ -61,7 +61,7 @@ def test_a_new_node_with_the_joining_token_is_answered():
 def test_a_gateway_hears_broadcasts_on_its_interface(gateway, free_port):
     running = gateway(NodeEntry(id="n1", token_sha256=token_sha256("secret")), discovery_port=free_port)
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as asking:
-        asking.settimeout(5.0)
+        asking.settimeout(60.0)
         asking.setsockopt(socket.SOL_SOCKET, socket.SO_BROADCAST, 1)
         asking.sendto(question(id="stranger"), ("127.255.255.255", free_port))
         asking.sendto(question(), ("127.255.255.255", free_port))

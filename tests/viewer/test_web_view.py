@@ -37,7 +37,7 @@ def viewer_files() -> Iterator[int]:
 
 def get(page: PageServer, path: str, host: str | None = None) -> tuple[int, dict[str, str], bytes]:
     port = int(page.address.rstrip("/").rpartition(":")[2])
-    connection = http.client.HTTPConnection("127.0.0.1", port, timeout=5)
+    connection = http.client.HTTPConnection("127.0.0.1", port, timeout=60)
     try:
         connection.request("GET", path, headers={"Host": host} if host else {})
         answer = connection.getresponse()

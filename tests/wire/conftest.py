@@ -9,7 +9,7 @@ import pytest
 
 from brachium_wire.bus import Bus
 
-DEADLINE_S = 15.0
+DEADLINE_S = 60.0
 
 
 def wait_until(condition: Callable[[], object], what: str) -> None:

@@ -124,7 +124,7 @@ def test_bringing_to_the_disk_holds_nobody_up_and_its_failure_is_told(
             folders.append(fd)
             return
         calls.append(fd)
-        assert slow.wait(10)
+        assert slow.wait(60)
         if len(calls) == 2:
             raise OSError(errno.EIO, os.strerror(errno.EIO))
 

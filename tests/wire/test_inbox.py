@@ -43,7 +43,7 @@ def test_every_arrival_is_drained_after_a_wake_and_none_is_missed() -> None:
         thread.start()
     read = 0
     while read < total:  # a missed wake would leave this waiting with messages in the inbox
-        assert wake.acquire(timeout=10.0), f"{read} of {total} read, and no wake"
+        assert wake.acquire(timeout=60.0), f"{read} of {total} read, and no wake"
         read += len(inbox.drain())
     for thread in threads:
         thread.join()

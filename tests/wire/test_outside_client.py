@@ -118,7 +118,7 @@ def test_it_finds_retained_infos_and_prints_skeletons_and_samples(
         ]
     )
     bus.put(place, encode(skeleton(1_040_000_000, 0.0)))
-    out, err = process.communicate(timeout=30)
+    out, err = process.communicate(timeout=60)
     assert (process.returncode, out, err) == (
         0,
         "skeleton p01 1040000000 right elbow 0.000 as its segments\n",

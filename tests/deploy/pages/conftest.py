@@ -195,7 +195,8 @@ class Screen:
         self.page.evaluate(DRESS, [language, theme, percent if self.own_letters else None])
         if not self.own_letters:
             self.browser_says.send("Page.setFontSizes", {"fontSizes": {"standard": 16 * percent // 100}})
-        self.page.wait_for_timeout(100)
+        self.until(lambda: self.page.evaluate("document.documentElement.lang") == language)
+        self.page.evaluate("new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
 
     def faults(self, target_px: int | None = None) -> list[str]:
         """What an eye would find wrong."""

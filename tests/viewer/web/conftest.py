@@ -16,7 +16,7 @@ from brachium_wire.bus import Bus
 from brachium_wire.codec import encode
 from brachium_wire.messages import Calibration, Info, Quality
 
-START_S = 40.0
+START_S = 60.0
 
 
 class Serving:
@@ -55,7 +55,7 @@ def _serving(**settings: object) -> Iterator[Serving]:
         yield one
     finally:
         one.stop.set()
-        one.thread.join(10.0)
+        one.thread.join(60.0)
         assert not one.thread.is_alive()
 
 
@@ -73,7 +73,7 @@ class Screen:
         self.number = 0
         self.last: dict[str, dict] = {}
 
-    async def until(self, found: Callable[[dict], bool], timeout_s: float = 20.0) -> dict:
+    async def until(self, found: Callable[[dict], bool], timeout_s: float = 60.0) -> dict:
         """Return the first message that fits; the last of each kind that was heard is looked at first."""
         for message in self.last.values():
             if found(message):
@@ -143,7 +143,7 @@ def wear(router_endpoint: str, arm_at) -> Callable[..., AbstractContextManager[s
             yield router_endpoint
         finally:
             stop.set()
-            thread.join(5.0)
+            thread.join(60.0)
 
     return worn
 

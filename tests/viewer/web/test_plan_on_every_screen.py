@@ -8,7 +8,7 @@ sync_api = pytest.importorskip("playwright.sync_api")
 
 pytestmark = [pytest.mark.network, pytest.mark.browser]
 
-PATIENCE_MS = 20_000
+PATIENCE_MS = 60_000
 
 
 def holds(page, identity: str, text: str) -> None:

@@ -28,7 +28,7 @@ def test_a_server_ends_while_a_calibration_is_waited_for(serve_pages, watch, mov
     async def calibrate(screen):
         await screen.until(lambda m: m["kind"] == "state" and m["subject"] == "p01")
         await screen.socket.send_json({"kind": "do", "id": 1, "verb": "calibrate"})
-        held.append(await asyncio.to_thread(asked.get, timeout=20.0))
+        held.append(await asyncio.to_thread(asked.get, timeout=60.0))
 
     with Bus.open(moving_arm) as bus:
         bus.serve_later(keys.command("lab", "p01", "calibrate"), lambda *question: asked.put(question))

@@ -9,7 +9,7 @@ sync_api = pytest.importorskip("playwright.sync_api")
 
 pytestmark = [pytest.mark.network, pytest.mark.browser]
 
-PATIENCE_MS = 20_000
+PATIENCE_MS = 60_000
 SHOWN = """() => {
   const put = (id, words) => {
     document.getElementById(id).hidden = false;
@@ -32,6 +32,11 @@ def page(browser, serve_pages, moving_arm, tmp_path) -> Iterator[Any]:
         page.close()
 
 
+def settled(page) -> None:
+    """Let the page lay itself out: what watches a size has drawn anew two frames later."""
+    page.evaluate("new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
+
+
 def box(page, selector: str) -> dict[str, float]:
     found: dict[str, float] = page.locator(selector).bounding_box()
     return found
@@ -46,7 +51,7 @@ def bottom(page, selector: str) -> float:
 def test_the_footer_lies_below_everything(page, size):
     page.set_viewport_size({"width": size[0], "height": size[1]})
     page.evaluate(SHOWN)
-    page.wait_for_timeout(200)
+    settled(page)
     top = box(page, "footer p")["y"]
     for above in ("#course", "#panel", "#actions"):
         assert bottom(page, above) <= top + 1, above
@@ -56,10 +61,10 @@ def test_the_footer_lies_below_everything(page, size):
 
 def test_what_is_said_under_start_moves_nothing(page):
     page.set_viewport_size({"width": 1400, "height": 900})
-    page.wait_for_timeout(200)
+    settled(page)
     before = [box(page, one) for one in ("#stage", "#angle", "#course", "#start")]
     page.evaluate("document.getElementById('action-said').textContent = 'Satz beendet: 22 Wiederholungen.'")
-    page.wait_for_timeout(200)
+    settled(page)
     assert [box(page, one) for one in ("#stage", "#angle", "#course", "#start")] == before
 
 
@@ -70,7 +75,7 @@ def test_the_gauge_is_as_wide_as_its_card_and_grows_with_the_letters(page):
 
     for width in (1400, 820, 390):
         page.set_viewport_size({"width": width, "height": 1000})
-        page.wait_for_timeout(200)
+        settled(page)
         track = box(page, "#gauge .track")
         assert track["x"] == pytest.approx(box(page, "#angle-value")["x"], abs=3.0)
         assert track["x"] + track["width"] == pytest.approx(
@@ -81,7 +86,7 @@ def test_the_gauge_is_as_wide_as_its_card_and_grows_with_the_letters(page):
         )
     for width in (1400, 820, 390, 320):
         page.set_viewport_size({"width": width, "height": 1000})
-        page.wait_for_timeout(200)
+        settled(page)
         edge = box(page, "#gauge")["x"] + box(page, "#gauge")["width"]
         for text in page.locator("#gauge text").all():
             found = text.bounding_box()
@@ -89,10 +94,10 @@ def test_the_gauge_is_as_wide_as_its_card_and_grows_with_the_letters(page):
         for tab in ("prepare", "exercise", "finish"):
             assert box(page, f"#tab-{tab}")["height"] < 60, (width, tab)  # in one line
     page.set_viewport_size({"width": 820, "height": 1000})
-    page.wait_for_timeout(200)
+    settled(page)
     small = legend()
     page.evaluate("document.documentElement.style.fontSize = '200%'")
-    page.wait_for_timeout(300)
+    settled(page)
     assert legend() == pytest.approx(2.0 * small, rel=0.15)
     edge = box(page, "#gauge")["x"] + box(page, "#gauge")["width"]
     for text in page.locator("#gauge text").all():

@@ -16,7 +16,7 @@ def ask_at_once(address: str, *rounds: Sequence[tuple[str, Mapping[str, object]]
 
     async def ask(socket: aiohttp.ClientWebSocketResponse, number: int, verb: str, words: Mapping) -> dict:
         await socket.send_json({"kind": "do", "id": number, "verb": verb, **words})
-        async with asyncio.timeout(40.0):
+        async with asyncio.timeout(60.0):
             while True:
                 message = json.loads((await socket.receive()).data)
                 if message["kind"] == "answer" and message["id"] == number:
@@ -26,7 +26,7 @@ def ask_at_once(address: str, *rounds: Sequence[tuple[str, Mapping[str, object]]
         async with aiohttp.ClientSession() as session:
             opened = [session.ws_connect(f"{address}/ws", headers={"Origin": address}) for _ in range(3)]
             sockets = [await one for one in opened]
-            async with asyncio.timeout(20.0):
+            async with asyncio.timeout(60.0):
                 while True:
                     message = json.loads((await sockets[0].receive()).data)
                     if message["kind"] == "state" and message["sides"] == ["right"]:

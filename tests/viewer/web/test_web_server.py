@@ -134,7 +134,7 @@ def test_a_screen_that_does_not_read_slows_no_other_and_skips_frames(
                 return any(one.counts.get("frames_skipped", 0) > 0 for one in heard)
 
             times = []
-            async with asyncio.timeout(40.0):
+            async with asyncio.timeout(60.0):
                 while not skipped():
                     before = times[-1] if times else 0.0
                     frame = await screen.until(lambda m, t=before: m["kind"] == "frame" and m["sent"] > t)

@@ -107,8 +107,8 @@ def method(report: Report) -> list[str]:
         f"angles are {words.SHOULDER}.",
         "Ranges are from the resting start to the farthest point held for 0.2 s; where an exercise lowers "
         "its angle, the farthest is the lowest. AAOS reference: ranges of healthy adults in general, not "
-        "what is to be expected of one person. Needed by daily activities: by most of them, after Morrey 1981 "
-        "(elbow, forearm), Ryu 1991 (wrist) and Namdari 2012 (shoulder).",
+        "what is to be expected of one person. Needed by daily activities: by most of them, after Morrey "
+        "1981 (elbow, forearm), Ryu 1991 (wrist) and Namdari 2012 (shoulder).",
         *_lengths(report.contents.sessions.get(report.session.subject) or Session()),
     ]
 
