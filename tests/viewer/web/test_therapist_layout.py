@@ -103,3 +103,38 @@ def test_the_gauge_is_as_wide_as_its_card_and_grows_with_the_letters(page):
     for text in page.locator("#gauge text").all():
         found = text.bounding_box()
         assert found["x"] + found["width"] <= edge + 2, text.text_content()
+
+
+def test_no_two_words_at_the_gauge_touch(page):
+    touching = page.evaluate("""async () => {
+        const { Gauge } = await import("/app/gauge.js");
+        const { LANGUAGES, speak } = await import("/app/words.js");
+        const found = [];
+        const across = (a, b) => a.left < b.right && b.left < a.right;
+        const touch = (a, b) => across(a, b) && a.top < b.bottom - 1 && b.top < a.bottom - 1;
+        for (const language of LANGUAGES) {
+            await speak(language);
+            for (const wide of [300, 460]) {
+                const box = document.createElement("div");
+                box.id = "gauge";
+                box.style.width = `${wide}px`;
+                document.body.append(box);
+                const gauge = new Gauge(box);
+                gauge.fit();
+                for (let limit = 5; limit <= 150; limit += 5) {
+                    gauge.mean({ band: [0, 150], need: 130, goal: limit - 5, limit, rises: true });
+                    const words = [...box.querySelectorAll("text")];
+                    const places = words.map((one) => one.getBoundingClientRect());
+                    for (let i = 0; i < words.length; i++) {
+                        for (let j = 0; j < i; j++) {
+                            const both = `${words[j].textContent} / ${words[i].textContent}`;
+                            if (touch(places[i], places[j])) found.push(`${wide} px: ${both}`);
+                        }
+                    }
+                }
+                box.remove();
+            }
+        }
+        return found;
+    }""")
+    assert touching == []

@@ -11,6 +11,12 @@ const GAP_S = 0.3;
 
 const COLOURS = ["--muted", "--line", "--trace", "--band", "--bad", "--good", "--ink", "--goal", "--surface"];
 
+/** Where a word stands under an edge so that none of the lines goes through it. */
+function below(edge, lines, ratio) {
+  const clear = 15 * ratio;
+  return lines.sort((a, b) => a - b).reduce((y, line) => (line > y - clear && line < y + 3 * ratio ? line + clear : y), edge + clear);
+}
+
 export class Chart {
   constructor(box) {
     this.box = box;
@@ -155,7 +161,10 @@ export class Chart {
       else ctx.fillRect(bbox.left, edge, bbox.width, bbox.top + bbox.height - edge);
       ctx.globalAlpha = 1;
     }
-    if (band) this.word(ctx, say("reference"), bbox.left + 6 * ratio, at(band[1]) + 14 * ratio, "--good", "left");
+    if (band) {
+      const lines = [need, goal, limit].filter((value) => value != null).map(at);
+      this.word(ctx, say("reference"), bbox.left + 6 * ratio, below(at(band[1]), lines, ratio), "--good", "left");
+    }
     const right = bbox.left + bbox.width - 6 * ratio;
     this.line(ctx, bbox, need, at, "--ink", [2, 4], say("need"), bbox.left + 0.45 * bbox.width, -6);
     this.line(ctx, bbox, goal, at, "--goal", [8, 5], say("goal"), right, rises ? 15 : -6);
@@ -173,7 +182,9 @@ export class Chart {
     ctx.moveTo(bbox.left, at(value));
     ctx.lineTo(bbox.left + bbox.width, at(value));
     ctx.stroke();
-    this.word(ctx, `${word} ${number(value)}°`, x, at(value) + below * ratio, name, "right");
+    const text = `${word} ${number(value)}°`;
+    const least = bbox.left + ctx.measureText(text).width + 4 * ratio; // on a narrow screen it begins at the edge
+    this.word(ctx, text, Math.max(x, least), at(value) + below * ratio, name, "right");
   }
 
   word(ctx, text, x, y, name, side) {

@@ -11,7 +11,6 @@ const ABOVE = 15; // where words stand
 const BELOW = 62;
 const ROW = 17;
 const LETTER = 7.4; // of width
-const WORDS = 150; // two words nearer than this would touch
 const SVG = "http://www.w3.org/2000/svg";
 
 function element(name, words, text) {
@@ -71,7 +70,7 @@ export class Gauge {
       this.tick("limit", limit, say("limit"), BELOW);
     }
     if (goal != null) this.tick("goal", goal, say("goal"), ABOVE);
-    const close = limit != null && need != null && Math.abs(this.at(limit) - this.at(need)) < WORDS;
+    const close = limit != null && need != null && this.touch(this.span(limit, say("limit")), this.span(need, say("need")));
     if (need != null) this.tick("need", need, say("need"), close ? BELOW + ROW : BELOW);
     const rows = close ? 2 : limit != null || need != null ? 1 : 0;
     const legend = band ? say("reference.range", { low: number(band[0]), high: number(band[1]) }) : say("reference.none");
@@ -87,9 +86,25 @@ export class Gauge {
 
   tick(kind, value, word, y) {
     const x = this.at(value);
-    const side = x > 0.75 * this.wide ? "end" : x < 0.25 * this.wide ? "start" : "middle";
     this.svg.append(element("path", { class: kind, d: `M${x} ${TOP - 5}V${TOP + HIGH + 5}` }));
-    this.svg.append(element("text", { class: `${kind}-word`, x, y, "text-anchor": side }, `${word} ${number(value)}°`));
+    this.svg.append(element("text", { class: `${kind}-word`, x, y, "text-anchor": this.anchor(x) }, `${word} ${number(value)}°`));
+  }
+
+  /** How a word stands at its tick: towards the middle from either end. */
+  anchor(x) {
+    return x > 0.75 * this.wide ? "end" : x < 0.25 * this.wide ? "start" : "middle";
+  }
+
+  /** From where to where a tick's word goes. */
+  span(value, word) {
+    const x = this.at(value);
+    const long = LETTER * `${word} ${number(value)}°`.length;
+    const from = { end: x - long, start: x, middle: x - long / 2 }[this.anchor(x)];
+    return [from, from + long];
+  }
+
+  touch([from, to], [start, end]) {
+    return from < end + LETTER && start < to + LETTER;
   }
 
   at(value) {
