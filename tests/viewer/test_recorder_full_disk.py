@@ -71,6 +71,18 @@ def test_monitor_and_page_show_the_alarm_in_words_while_the_recorder_is_there() 
         token(keys.alive(ROOM, "recorder", "r1"), False)
     assert "ALARM" not in block(network.report(2))
     assert page.state(2)["alarms"] == []
+    for token in (network.token, page.network.token):  # another one of the same name has said nothing yet
+        token(keys.alive(ROOM, "recorder", "r1"), True)
+    assert "ALARM" not in block(network.report(3))
+    assert page.state(3)["alarms"] == []
+
+
+def test_a_page_leaves_its_own_recorders_alarm_to_the_session_that_knows_it_first() -> None:
+    said = encode(Health(kind="recorder", id="r1", time_ns=1, uptime_s=1.0, alarm="the disk takes no more"))
+    page = PageState(ROOM, own_recorder="r1")
+    page.feed(keys.service(ROOM, "recorder", "r1"), said, 1)
+    page.feed(keys.service(ROOM, "recorder", "r2"), said, 1)
+    assert len(page.state(2)["alarms"]) == 1
 
 
 def test_a_folder_without_room_to_begin_is_said_and_holds_nothing(

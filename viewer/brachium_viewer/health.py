@@ -58,7 +58,10 @@ class Network:
             return
         kind, _, name = parsed.detail.partition("/")
         if parsed.topic == "alive" and kind not in _NO_SERVICES:
-            self._services.setdefault((kind, name), _Service()).token = alive
+            service = self._services.setdefault((kind, name), _Service())
+            if alive and not service.token:
+                service.health = service.heard_ns = None  # said by the one that went before it
+            service.token = alive
 
     def report(self, now_ns: int) -> NetworkHealth:
         """Return how everything fares at `now_ns`."""

@@ -42,8 +42,10 @@ class _Subject:
 class PageState:
     """All that is known of the room, and what is chosen and running."""
 
-    def __init__(self, room: str, subject: str | None = None) -> None:
+    def __init__(self, room: str, subject: str | None = None, *, own_recorder: str = "") -> None:
+        """`own_recorder`: the id of the one whose alarms the session itself knows, and sooner."""
         self.room, self.subject = room, subject
+        self._own_recorder = own_recorder
         self.network = Network()
         self.plans = Plans()
         self.running: RunningSet | None = None
@@ -166,7 +168,7 @@ class PageState:
             "alarms": [
                 {"what": "recording", "reason": s.alarm}
                 for s in report.services
-                if s.kind == "recorder" and s.alarm
+                if s.kind == "recorder" and s.alarm and s.id != self._own_recorder
             ],
             "sides": self.sides(),
             "calibration": frames.calibration(subject.calibration),

@@ -96,8 +96,9 @@ class _Server:
         self._settings, self._bus, self._doing = settings, heard, doing
         self._clock = HostClock()
         self._id = f"web-{os.getpid()}"
-        self._state = PageState(settings.room, settings.subject)
-        self._sessions = SessionDesk(settings.sessions, settings.endpoint, settings.room, self._id)
+        recorder = f"{self._id}-session"
+        self._state = PageState(settings.room, settings.subject, own_recorder=recorder)
+        self._sessions = SessionDesk(settings.sessions, settings.endpoint, settings.room, recorder)
         self._desk = Desk(doing, self._state, self._sessions, self._clock)
         self._seats: set[Seat] = set()
         self._left = 0

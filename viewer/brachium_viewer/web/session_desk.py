@@ -39,11 +39,9 @@ class Unreached(ValueError):
 class SessionDesk:
     """One session at a time; its recorder runs in a thread of its own. Called on one event loop."""
 
-    def __init__(self, folder: Path, endpoint: str, room: str, service_id: str) -> None:
+    def __init__(self, folder: Path, endpoint: str, room: str, recorder_id: str) -> None:
         self.folder = folder
-        self._settings = recorder.RecordSettings(
-            endpoint=endpoint, room=room, folder=folder, id=f"{service_id}-session"
-        )
+        self._settings = recorder.RecordSettings(endpoint=endpoint, room=room, folder=folder, id=recorder_id)
         self._token = keys.services(room, f"recorder/{self._settings.id}/alive")
         self._stop = threading.Event()
         self._thread: threading.Thread | None = None
