@@ -1,10 +1,11 @@
 """What all tests share: how Hypothesis judges, and a router of the product's own settings."""
 
+import itertools
 import os
 import socket
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from typing import Any
 
@@ -30,6 +31,33 @@ with zenoh.open(zenoh.Config.from_json5(sys.argv[1])):
 """
 
 
+_WORKER = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0").removeprefix("gw"))
+_BLOCK, _BLOCKS = 2_000, 6
+_FIRST_PORT = 20_000 + _BLOCK * (_WORKER % _BLOCKS)
+"""Below where systems take the ports of connections from, a block for each worker: nobody takes a port
+between its being found and its being used."""
+_NEXT = itertools.count(os.getpid())  # another run at the same time begins elsewhere
+
+
+def _unused_port() -> int:
+    for number in itertools.islice(_NEXT, _BLOCK):
+        port = _FIRST_PORT + number % _BLOCK
+        with socket.socket() as tcp, socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as udp:
+            try:
+                tcp.bind(("127.0.0.1", port))
+                udp.bind(("127.0.0.1", port))
+            except OSError:
+                continue
+            return port
+    raise AssertionError(f"no port from {_FIRST_PORT} to {_FIRST_PORT + _BLOCK - 1} is free")
+
+
+@pytest.fixture(scope="session")
+def unused_port() -> Callable[[], int]:
+    """A function that returns a port of loopback, free for TCP and UDP, another one each time."""
+    return _unused_port
+
+
 class RouterProcess:
     """A router on loopback in a process of its own; it can be started again at the same endpoint.
 
@@ -38,9 +66,7 @@ class RouterProcess:
     """
 
     def __init__(self) -> None:
-        with socket.socket() as probe:
-            probe.bind(("127.0.0.1", 0))
-            chosen = config.RouterSettings(port=probe.getsockname()[1])
+        chosen = config.RouterSettings(port=_unused_port())
         self.endpoint = config.endpoint(chosen)
         self._command = [sys.executable, "-c", _ROUTER, config.router_json5(chosen)]
         self._process: subprocess.Popen[bytes] | None = None

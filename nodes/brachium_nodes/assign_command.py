@@ -47,13 +47,24 @@ def serve_assign(
 
     def _done(wanted: _Wanted, subject: str) -> Answer:
         done: Future[str] = Future()
+
+        def work() -> None:
+            if not done.set_running_or_notify_cancel():
+                return
+            try:
+                done.set_result(assign(wanted.id, subject, wanted.segment, wanted.mounting))
+            except Exception as error:  # told to who asks
+                done.set_exception(error)
+
         try:
-            loop.call_soon_threadsafe(
-                lambda: done.set_result(assign(wanted.id, subject, wanted.segment, wanted.mounting))
-            )
+            loop.call_soon_threadsafe(work)
+        except RuntimeError:  # the loop is closed
+            return Answer(ok=False, reason="the gateway is ending")
+        try:
             reason = done.result(timeout=ANSWER_WITHIN_S)
-        except (RuntimeError, NoAnswer):  # the loop is closed, or just stopped
-            reason = "the gateway is ending"
+        except NoAnswer:
+            # What was begun is answered by its outcome; what was not is never carried out behind a refusal.
+            reason = "the gateway is too busy, or ending" if done.cancel() else done.result()
         return Answer(ok=not reason, reason=reason)
 
     bus.serve_later(keys.commands(room, "assign"), asked)

@@ -105,10 +105,10 @@ class Gateway:
                 self._bus, settings.room, loop, lambda node: not node.startswith(SLIMEVR), self._assign
             )
             log.info("gateway %s takes nodes at %s", settings.id, self._heart.text)
-            self._beat(now=True)
             async with answer_seekers(
                 address, settings.discovery_port, self._heart.text, self._roster.token_of
             ):
+                self._beat(now=True)
                 while not stop.is_set():
                     await asyncio.sleep(TICK_S)
                     self._tick(loop.time())

@@ -1,6 +1,5 @@
 import json
 import os
-import socket
 import subprocess
 import threading
 import time
@@ -30,14 +29,8 @@ def until(condition: Callable[[], object], what: str) -> None:
         pause.wait(0.01)
 
 
-def unused_port() -> int:
-    with socket.socket() as s:
-        s.bind(("127.0.0.1", 0))
-        return int(s.getsockname()[1])
-
-
 @pytest.fixture
-def free_port() -> int:
+def free_port(unused_port: Callable[[], int]) -> int:
     return unused_port()
 
 

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from brachium_body.continuation import AngleTracker
+from brachium_nodes import emulate
 from brachium_nodes.emulate import EmulateSettings, node_entries, run
 from brachium_nodes.emulated_power import EmulatedPower
 from brachium_nodes.link import FaultSettings
@@ -17,6 +18,7 @@ from brachium_nodes.node_stream import Timeline
 from brachium_nodes.wearer import Wearer, WearerSettings
 from brachium_wire import keys
 from brachium_wire.codec import decode
+from brachium_wire.hosttime import HostClock, follow_host_time
 from brachium_wire.messages import SampleBatch, Session
 from brachium_wire.samples import read_samples
 
@@ -62,7 +64,16 @@ def subset(count) -> tuple[int, int, int]:
 
 
 @pytest.mark.network
-def test_injected_and_counted_are_the_same_and_truth_has_gateway_time(gateway, listener, endpoint) -> None:
+def test_injected_and_counted_are_the_same_and_truth_has_gateway_time(
+    gateway, listener, endpoint, monkeypatch
+) -> None:
+    followed: list[HostClock] = []
+
+    def follow(*words, **more) -> HostClock:
+        followed.append(follow_host_time(*words, **more))
+        return followed[-1]
+
+    monkeypatch.setattr(emulate, "follow_host_time", follow)
     wearer = WearerSettings(level="exact", seed=3)
     settings = EmulateSettings(
         endpoint=endpoint, room=ROOM, token="t", seconds=5.6, wearer=wearer, faults=FAULTS
@@ -93,14 +104,17 @@ def test_injected_and_counted_are_the_same_and_truth_has_gateway_time(gateway, l
     origins = np.array([b.time_ns for b in batches]) - taken_ns
     stated = np.array([b.uncertainty_ns for b in batches])
     origin_ns = int(np.median(origins[-20:]))
-    assert (np.abs(origins - origin_ns) <= stated + stated[-1]).all()
+    doubt_ns = stated[-20:].max()
+    assert (np.abs(origins - origin_ns) <= stated + doubt_ns).all()
     # Truth told 1 ms too late would be off by as much as the elbow turns meanwhile.
     moving = [t for t in truth if t.angles["elbow_flexion"] > 0.05]
     told = np.array([t.angles["elbow_flexion"] for t in moving])
     at_s = np.array([(t.time_ns - origin_ns) * 1e-9 for t in moving])
     shifts = np.arange(-20, 21) * 1e-3
     errors = [np.abs(elbow(emulated, at_s + shift) - told).max() for shift in shifts]
-    assert abs(shifts[int(np.argmin(errors))]) <= 0.002
+    (clock,) = followed
+    doubt_s = 1e-9 * (doubt_ns + clock.uncertainty_ns)
+    assert abs(shifts[int(np.argmin(errors))]) <= 0.002 + doubt_s
     assert len(moving) > 10
 
 
@@ -205,30 +219,32 @@ def test_battery_and_signal_are_told(gateway, listener, endpoint, direct: bool) 
     if not direct:
         url = gateway(*node_entries(settings)).url
         settings = EmulateSettings(**{**vars(settings), "gateway": url})
+    begun = time.monotonic()
     run(settings, threading.Event())
+    took = int(time.monotonic() - begun)
     last = listener.until_gone(1)["p01", "hand_r"]
     assert last.node_dropped == 0
     assert last.battery_v is not None
     assert last.rssi_dbm is not None
     power = EmulatedPower.draw(worn.seed, "hand_r")
-    assert last.rssi_dbm in {power.status(second).rssi_dbm for second in (1.0, 2.0, 3.0)}
+    assert last.rssi_dbm in {power.status(second).rssi_dbm for second in range(1, took + 2)}
     assert abs(last.battery_v - power.full_v) < 0.002
 
 
 @pytest.mark.network
-def test_the_session_is_kept_for_who_comes_late(bus, endpoint) -> None:
+def test_the_session_is_kept_for_who_comes_late(bus, endpoint, waiting) -> None:
     stop = threading.Event()
     settings = EmulateSettings(
         endpoint=endpoint, room="late", direct=True, wearer=WearerSettings(arms="left")
     )
     thread = threading.Thread(target=run, args=(settings, stop))
     thread.start()
-    deadline = time.monotonic() + 10
     found: list = []
-    while not found and time.monotonic() < deadline:
-        found = bus.fetch(keys.session("late", "p01"))
-    stop.set()
-    thread.join(timeout=60.0)
+    try:
+        waiting(lambda: found.extend(bus.fetch(keys.session("late", "p01"))) or found, "the session")
+    finally:
+        stop.set()
+        thread.join(timeout=60.0)
     assert not thread.is_alive(), "emulate did not end within 2 s"
     session = decode(found[0][1], Session)
     assert (session.side, session.height_m, session.facing_deg) == ("left", 1.8, 0.0)

@@ -241,7 +241,7 @@ def test_an_unknown_node_is_listed_as_waiting_and_assigned_live(gateway, listene
         assert refused.value.code == "unknown_node"
         await until(lambda: any("n2" in h.waiting for h in listener.of("health")), "n2 waiting")
         question = encode(Command(arguments={"id": "n2", "segment": "hand_r"}))
-        reply = await asyncio.to_thread(bus.ask, keys.command(ROOM, "p01", "assign"), question)
+        reply = await asyncio.to_thread(bus.ask, keys.command(ROOM, "p01", "assign"), question, WITHIN_S)
         assert decode(reply, Answer).ok
         assert (await client(url, "n2").join()).segment == "hand_r"
 
@@ -255,7 +255,7 @@ def test_assigning_a_connected_node_sends_it_to_its_new_place(gateway, bus) -> N
         node = client(url)
         await node.join()
         question = encode(Command(arguments={"id": "n1", "segment": "forearm_l"}))
-        reply = await asyncio.to_thread(bus.ask, keys.command(ROOM, "p02", "assign"), question)
+        reply = await asyncio.to_thread(bus.ask, keys.command(ROOM, "p02", "assign"), question, WITHIN_S)
         assert decode(reply, Answer).ok
         assert await node.closed() == f.CLOSE_CODES["reassigned"]
         welcome = await node.join()
@@ -273,7 +273,7 @@ def infos(bus) -> list[str]:
 
 def assign(bus, node: str, subject: str, segment: str) -> Answer:
     question = encode(Command(arguments={"id": node, "segment": segment}))
-    return decode(bus.ask(keys.command(ROOM, subject, "assign"), question), Answer)
+    return decode(bus.ask(keys.command(ROOM, subject, "assign"), question, timeout_s=WITHIN_S), Answer)
 
 
 def test_the_info_of_a_node_assigned_away_is_forgotten_unless_another_took_the_place(gateway, bus) -> None:
@@ -303,7 +303,7 @@ def test_the_info_of_a_node_assigned_away_is_forgotten_unless_another_took_the_p
 @pytest.mark.parametrize("question", [b"", b"\xc1", encode(Command(arguments={"id": 3, "segment": "x"}))])
 def test_a_bad_assignment_is_answered_with_the_reason(gateway, bus, question) -> None:
     gateway(entry("n1", "forearm_r"))
-    answer = decode(bus.ask(keys.command(ROOM, "p01", "assign"), question), Answer)
+    answer = decode(bus.ask(keys.command(ROOM, "p01", "assign"), question, timeout_s=WITHIN_S), Answer)
     assert not answer.ok
     assert "assign" in answer.reason
 
@@ -311,7 +311,7 @@ def test_a_bad_assignment_is_answered_with_the_reason(gateway, bus, question) ->
 def test_assigning_a_node_that_nobody_knows_is_refused(gateway, bus) -> None:
     gateway(entry("n1", "forearm_r"))
     question = encode(Command(arguments={"id": "ghost", "segment": "hand_r"}))
-    answer = decode(bus.ask(keys.command(ROOM, "p01", "assign"), question), Answer)
+    answer = decode(bus.ask(keys.command(ROOM, "p01", "assign"), question, timeout_s=WITHIN_S), Answer)
     assert not answer.ok
     assert "ghost" in answer.reason
 

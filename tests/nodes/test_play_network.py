@@ -223,7 +223,7 @@ def test_playback_ends_when_told(listener, folder, endpoint) -> None:
     settings = PlaySettings(path=folder, endpoint=endpoint, room=ROOM, direct=True, speed=0.01)
     thread = threading.Thread(target=run, args=(settings, stop))
     thread.start()
-    listener.until(lambda: listener.of("info"), "the first info")
+    listener.until(lambda: len(listener.of("info")) == 2, "both infos")
     stop.set()
     thread.join(timeout=60.0)
     assert not thread.is_alive(), "play did not end within 2 s"

@@ -24,6 +24,7 @@ from brachium_nodes.wearer import Wearer, WearerSettings
 
 pytestmark = pytest.mark.network
 
+WITHIN_S = 60.0
 FORM = {
     "wifi_name": "gym & co",
     "wifi_password": "päss word 1",
@@ -112,24 +113,19 @@ def test_what_cannot_be_is_refused_with_its_reason(on_form, change, said) -> Non
 
 
 @pytest.fixture(scope="module")
-def on_form(firmware, tmp_path_factory, unused_port_of_module):
+def on_form(firmware, tmp_path_factory, unused_port):
     """One node for all refusals: it stays."""
-    flash = Flash(tmp_path_factory.mktemp("form") / "node", unused_port_of_module)
+    flash = Flash(tmp_path_factory.mktemp("form") / "node", unused_port())
     node = FirmwareNode.start(flash.folder, firmware)
-    deadline = time.monotonic() + 15
-    while "one line" not in node.said():
-        assert time.monotonic() < deadline
-        time.sleep(0.01)
-    yield lambda fields: flash.ask("POST", "/save", urlencode(fields))
-    node.stop()
+    try:
+        deadline = time.monotonic() + WITHIN_S
+        while "one line" not in node.said():
+            assert time.monotonic() < deadline
+            time.sleep(0.01)
+        yield lambda fields: flash.ask("POST", "/save", urlencode(fields))
+    finally:
+        node.stop()
     assert not flash.file.exists()
-
-
-@pytest.fixture(scope="module")
-def unused_port_of_module() -> int:
-    with socket.socket() as s:
-        s.bind(("127.0.0.1", 0))
-        return int(s.getsockname()[1])
 
 
 HOSTILE = {

@@ -37,9 +37,11 @@ def device(path, timeline, delay_s=0.02):
     port = EmulatedPort(ShimmerTwin(path=path, delay_s=delay_s, jitter_s=0.002), WEARER)
     thread = threading.Thread(target=lambda: asyncio.run(port.serve(timeline, stop)))
     thread.start()
-    yield port
-    stop.set()
-    thread.join()
+    try:
+        yield port
+    finally:
+        stop.set()
+        thread.join()
 
 
 @contextmanager
@@ -58,9 +60,11 @@ def serving(endpoint, path, room):
 
     thread = threading.Thread(target=run)
     thread.start()
-    yield failed
-    stop.set()
-    thread.join()
+    try:
+        yield failed
+    finally:
+        stop.set()
+        thread.join()
 
 
 def messages(heard, topic, kind):

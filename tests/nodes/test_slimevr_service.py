@@ -71,7 +71,9 @@ def test_a_subject_that_comes_in_elsewhere_is_left_to_that_host(endpoint, bus: B
         listener.until(lambda: bus.alive(token), "the tracker")
         claims.claim("p01")  # at once with the other: the first in the alphabet stays
         listener.until(lambda: not bus.alive(token), "the tracker's end")
-        assert not listener.of("status", "hand_r")[-1].connected
+        listener.until(
+            lambda: (told := listener.of("status", "hand_r")) and not told[-1].connected, "its last status"
+        )
         tracker.sendto(HANDSHAKE, door.at)
         tracker.sendto(SENSOR, door.at)
         listener.until(lambda: door.health[-1].counts.get("refused"), "the refusal")

@@ -52,5 +52,5 @@ def test_an_hour_forwards_and_backwards_changes_no_sample_s_time(gateway, listen
     assert max(offset_ns) - min(offset_ns) <= 2 * max(b.uncertainty_ns for b in batches) + 1_000_000
     times = [t for b in batches for t in read_samples(b).time_ns]
     assert times == sorted(set(times))
-    last = listener.of("status")[-1]
+    last = listener.until_gone(1)["p01", "forearm_r"]
     assert (last.received, last.lost, last.drops) == (300, 0, {})

@@ -1,6 +1,5 @@
-import socket
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 import pytest
@@ -16,10 +15,9 @@ from brachium_wire.topics import TOPICS
 pytestmark = pytest.mark.network
 
 
-def free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
+@pytest.fixture
+def free_port(unused_port: Callable[[], int]) -> int:
+    return unused_port()
 
 
 @contextmanager
@@ -35,8 +33,8 @@ def running(settings: RouterSettings) -> Iterator[None]:
         assert not thread.is_alive(), "the router must end within 2 s"
 
 
-def test_it_shows_its_health_and_a_token():
-    settings = RouterSettings(port=free_port(), room="gym")
+def test_it_shows_its_health_and_a_token(free_port):
+    settings = RouterSettings(port=free_port, room="gym")
     with running(settings), Bus.open(endpoint(settings)) as bus:
         inbox = bus.subscribe(keys.services("gym"))
         assert inbox.wait(60.0)
@@ -48,8 +46,8 @@ def test_it_shows_its_health_and_a_token():
         assert bus.alive(keys.services("gym", "*/*/alive")) == [keys.alive("gym", "router", "router")]
 
 
-def test_messages_reach_an_other_session_and_oversize_ones_do_not():
-    settings = RouterSettings(port=free_port())
+def test_messages_reach_an_other_session_and_oversize_ones_do_not(free_port):
+    settings = RouterSettings(port=free_port)
     with running(settings), Bus.open(endpoint(settings)) as one, Bus.open(endpoint(settings)) as other:
         key = keys.skeleton("lab", "p01", "right")
         inbox = other.subscribe(keys.subjects("lab", "skeleton/*"))
@@ -71,8 +69,8 @@ def test_messages_reach_an_other_session_and_oversize_ones_do_not():
         assert sent[1] not in got
 
 
-def test_a_taken_port_is_one_line():
-    settings = RouterSettings(port=free_port())
+def test_a_taken_port_is_one_line(free_port):
+    settings = RouterSettings(port=free_port)
     with running(settings):
         Bus.open(endpoint(settings)).close()
         with pytest.raises(CannotListen, match="in use") as error:
@@ -81,6 +79,6 @@ def test_a_taken_port_is_one_line():
         assert "/root" not in str(error.value)
 
 
-def test_a_foreign_address_is_one_line():
+def test_a_foreign_address_is_one_line(free_port):
     with pytest.raises(CannotListen, match="no address of this machine"):
-        run(RouterSettings(bind="203.0.113.7", port=free_port()), threading.Event())
+        run(RouterSettings(bind="203.0.113.7", port=free_port), threading.Event())

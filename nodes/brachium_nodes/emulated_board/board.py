@@ -125,7 +125,9 @@ class Board:
 
     def _refuse(self) -> None:
         settings = self.settings
-        if self._stalls and settings.stall_us is not None and self._feed.since_us() >= settings.stall_us:
+        begun_us = self.chip.begun_us
+        due = begun_us is not None and self.clock() - begun_us >= (settings.stall_us or 0)
+        if self._stalls and due:
             self._stalls = False
             self.pause(settings.stall_ms)
         self.counts.transactions += 1

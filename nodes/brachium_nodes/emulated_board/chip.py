@@ -27,6 +27,8 @@ class Chip:
         self._first = self._end = 0  # numbers of the samples in the FIFO
         self._part = 0  # bytes of the first one that are read
         self.gathers = False
+        self.begun_us: int | None = None
+        """When it first gathered."""
         self.lost = False
         self.overflows = 0
 
@@ -57,6 +59,8 @@ class Chip:
         """Begin to gather from now on, or stop; either way the FIFO is empty then."""
         self._first = self._end = self.feed.due() if on else 0
         self.gathers, self._part, self.lost = on, 0, False
+        if on and self.begun_us is None:
+            self.begun_us = self.clock()
 
     def size(self) -> int:
         """Return how many bytes the FIFO holds."""

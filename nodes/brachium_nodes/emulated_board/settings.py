@@ -23,7 +23,7 @@ class BoardSettings:
     refusals: float = 0.0
     """Probability that the bus refuses a transfer."""
     stall_us: int | None = None
-    """When the bus stands still once, after the first sample, and for how long."""
+    """When the bus stands still once, after the chip began to gather, and for how long."""
     stall_ms: int = 0
     field_us: int = 7300
     """How long the magnetometer takes for one measurement."""

@@ -64,7 +64,7 @@ class Network:
         port = self.endpoint.rpartition(":")[2]
         services = {
             "router": ["router", "--room", ROOM, "--port", port],
-            "fuse": ["fuse", *self._network],
+            "fuse": ["fuse", "--no-auto-pose", *self._network],  # what is asked for is seen to be done
             "gateway": ["gateway", *self._network, "--port", str(self.gateway), "--site", str(site)],
         }
         for name, words in services.items():
