@@ -29,8 +29,11 @@ def asked(
         answered.set()
 
     threading.Thread(target=ask, daemon=True).start()
-    while not answered.is_set() and not stop.is_set():
+    while True:
+        over = answered.is_set() or stop.is_set()  # looked at first: what was told before the answer is shown
         for _, payload in news.drain():
             show(decode(payload, Calibration))
+        if over:
+            break
         news.wait(LOOK_S)
     return decode(found[0], Answer) if found and found[0] is not None else None

@@ -153,8 +153,8 @@ def run(
     with Bus.open(settings.endpoint, stop=stop) as bus:
         # Subscribed before anything is asked for: what comes in the meantime waits in the inbox.
         inbox = bus.subscribe(keys.everything(settings.room), CAPACITY)
-        heart = Heart(bus, settings.room, "recorder", settings.id)
         with _create(settings) as writer:
+            heart = Heart(bus, settings.room, "recorder", settings.id)  # alive means that there is a file
             recorder = Recorder(writer, settings.subject, on_end)
             heart.text = writer.path.name
             for key, payload in opening(bus, settings.room, settings.subject):

@@ -29,6 +29,8 @@ log = logging.getLogger(__name__)
 DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
 LEASE_MS = 4000
 """A host that vanished is noticed after this; TCP hides shorter Wi-Fi outages."""
+ANSWERED_S = 10.0
+"""A late answer must not count as none; that all have answered ends the wait, and so does a dead line."""
 ROOM_USER = "room"
 """The user all programs of a room attach as, where the room has a password."""
 PASSWORD_VARIABLE = "BRACHIUM_PASSWORD"
@@ -215,8 +217,7 @@ class Bus:
     def retain(self, key: str, payload: bytes) -> None:
         """Publish on a key and answer who asks for it later with the last value, as long as this bus is open.
 
-        Who subscribes, then fetches, and reads what it fetched before what it received, ends with the last
-        value.
+        Who subscribes, then fetches, and reads that before what it received, ends with the last value.
         """
         keys.parse(key)
         with self._retaining:  # the order of what is kept is the order of what is put
@@ -246,11 +247,10 @@ class Bus:
         with self._lock:
             self._kept.append(declared)  # Zenoh undeclares what nobody holds
 
-    def fetch(self, key_expression: str, timeout_s: float = 1.0) -> list[tuple[str, bytes]]:
+    def fetch(self, key_expression: str, timeout_s: float = ANSWERED_S) -> list[tuple[str, bytes]]:
         """Return the retained (key, payload) that match; empty when there is none."""
-        replies = self._session.get(
-            keys.expression(key_expression), timeout=timeout_s, target=zenoh.QueryTarget.ALL
-        )
+        wanted = keys.expression(key_expression)
+        replies = self._session.get(wanted, timeout=timeout_s, target=zenoh.QueryTarget.ALL)
         return [(str(r.ok.key_expr), r.ok.payload.to_bytes()) for r in replies if r.ok is not None]
 
     def subscribe(self, key_expression: str, capacity: int = 16384) -> Inbox:
@@ -338,7 +338,7 @@ class Bus:
 
         return end
 
-    def alive(self, key_expression: str, timeout_s: float = 1.0) -> list[str]:
+    def alive(self, key_expression: str, timeout_s: float = ANSWERED_S) -> list[str]:
         """Return the keys of the tokens that match now; Zenoh may find none on a bus watching them."""
         replies = self._session.liveliness().get(keys.expression(key_expression), timeout=timeout_s)
         return [str(r.ok.key_expr) for r in replies if r.ok is not None]

@@ -11,11 +11,13 @@ def test_a_slow_screen_gets_the_newest_frame_and_state_and_all_its_answers():
             seat.put_state(f"state {number}")
         seat.put_answer("first")
         seat.put_answer("second")
+        seat.put_state("state 100")
+        seat.put_state("state 101")
         taken = await seat.take()
         assert seat.skipped == 99
         return taken
 
-    assert asyncio.run(run()) == ["first", "second", "state 99", "frame 99"]
+    assert asyncio.run(run()) == ["state 99", "first", "second", "state 101", "frame 99"]
 
 
 def test_who_asks_and_never_reads_loses_the_oldest_answers():

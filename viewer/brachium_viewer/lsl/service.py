@@ -25,7 +25,8 @@ log = logging.getLogger(__name__)
 WAIT_S = 0.02
 LOOK_S = 1.0
 """Between two looks for new marker streams, and two tries to learn a host's time."""
-ANSWER_S = 0.2
+ANSWER_S = 2.0
+"""Where nobody tells a host's time, that is known at once."""
 MARKER = "marker"
 """Kind of the events that came from other LSL programs."""
 TRIPLE_TAP = "triple_tap"
@@ -64,6 +65,7 @@ class Service:
         """By subject."""
         self._clocks: dict[str, LslClock] = {}
         self._asked_s: dict[str, float] = {}
+        self._compared: set[str] = set()  # hosts, since a sensor of theirs was last told of
         self._taps: dict[tuple[str, str], TapWatch] = {}
         self._heart = Heart(bus, settings.room, "lsl", settings.id)
 
@@ -117,7 +119,8 @@ class Service:
     def _inform(self, key: keys.Key, info: Info) -> None:
         self._infos[key.subject, key.detail] = info
         self._hosts[key.subject] = info.host
-        self._asked_s.pop(info.host, None)  # who tells of a sensor may have begun anew, with another time
+        self._asked_s.pop(info.host, None)
+        self._compared.discard(info.host)  # who tells of a sensor may have begun anew, with another time
 
     def _samples(self, key: keys.Key, batch: SampleBatch) -> None:
         info = self._infos.get((key.subject, key.detail))
@@ -180,7 +183,7 @@ class Service:
         if host is None:
             return None
         asked_s = self._asked_s.get(host)
-        if asked_s is None or (host not in self._clocks and time.monotonic() - asked_s > LOOK_S):
+        if asked_s is None or (host not in self._compared and time.monotonic() - asked_s > LOOK_S):
             self._compare(host)
             self._asked_s[host] = time.monotonic()
         return self._clocks.get(host)
@@ -192,6 +195,7 @@ class Service:
         except NoHostTime as error:
             log.warning("%s", error)
             return
+        self._compared.add(host)
         found = compare(clock.now_ns, self._pylsl.local_clock, clock.uncertainty_ns)
         known = self._clocks.get(host)
         if known is not None and not known.agrees(found):

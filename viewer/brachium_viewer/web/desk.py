@@ -25,8 +25,9 @@ LONGEST_S = 300.0
 HEARD_S = 1.0
 BACK_S = 0.5
 """Between two looks whether the recording can be reached again."""
-OWED_S = 3.0
-"""A report waits so long for the end of a set: two looks, each as long as a look can take."""
+OWED_S = 5.0
+"""A report waits so long for the end of a set: a look at a router that vanished takes 4 s, until its line is
+noticed to be dead."""
 STOPPED_UNWRITTEN = (
     "stopped, but that is not written yet: it is as soon as the router and the recorder are back"
 )

@@ -6,12 +6,14 @@ So a slow screen skips frames, and neither grows a queue nor holds up another.
 import asyncio
 from collections import deque
 
-ANSWERS = 32
-"""Answers wait for their screen; one that asks and does not read loses its oldest."""
+ANSWERS = 64
+"""Answers, and states told before one, wait for their screen; one that asks and does not read loses its
+oldest."""
 
 
 class Seat:
-    """One screen's place. Answers are all given, in order; of frames and states only the newest."""
+    """One screen's place. Answers are all given, in order, each after the state that was told before it; of
+    frames and of states since the last answer only the newest."""
 
     def __init__(self) -> None:
         self._answers: deque[str] = deque(maxlen=ANSWERS)
@@ -32,7 +34,10 @@ class Seat:
         self._something.set()
 
     def put_answer(self, text: str) -> None:
-        """Give an answer."""
+        """Give an answer; a state from before it never comes after it."""
+        if self._state is not None:
+            self._answers.append(self._state)
+            self._state = None
         self._answers.append(text)
         self._something.set()
 

@@ -140,6 +140,7 @@ async function tellStop(reason) {
   }
 }
 
+await speak(); // before the line opens: nobody is shown a word's key
 const link = new Link({
   line: (up) => {
     room.up = up;
@@ -201,5 +202,4 @@ document.addEventListener("keydown", (event) => {
 });
 document.addEventListener("language", () => screens.enter(side(), choices()));
 
-await speak();
 screens.enter(side(), choices());
