@@ -6,6 +6,7 @@ import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -28,7 +29,7 @@ def event(number: int) -> bytes:
     return encode(Event(time_ns=number, kind="mark"))
 
 
-def until(true: Callable[[], bool], seconds: float = 10.0) -> None:
+def until(true: Callable[[], bool], seconds: float = 60.0) -> None:
     deadline = time.monotonic() + seconds
     while not true():
         assert time.monotonic() < deadline, "the deadline passed"
@@ -61,7 +62,7 @@ class Running:
 
     def end(self) -> RecordReport:
         self.stop.set()
-        report = self._done.result(10)
+        report = self._done.result(60.0)
         self._pool.shutdown()
         return report
 
@@ -131,6 +132,23 @@ def test_the_time_given_ends_it(endpoint: str, tmp_path: Path) -> None:
     report = recorder.run(settings, threading.Event())
     assert report.missing == {}
     assert recording.is_closed(report.path)
+
+
+@pytest.mark.network
+def test_a_recorder_without_room_to_begin_is_never_announced(
+    endpoint: str, tmp_path: Path, disk: SimpleNamespace, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    announced: list[str] = []
+
+    def announce(_bus: Bus, key: str) -> Callable[[], None]:
+        announced.append(key)
+        return lambda: None
+
+    monkeypatch.setattr(Bus, "announce", announce)
+    disk.room = 0
+    with pytest.raises(OSError, match="No space left"):
+        recorder.run(RecordSettings(endpoint=endpoint, room=ROOM, folder=tmp_path), threading.Event())
+    assert announced == []  # who waits for the token would take it for a recording
 
 
 def test_what_is_not_recorded_is_counted_by_name(tmp_path: Path) -> None:

@@ -7,12 +7,12 @@ import textwrap
 import threading
 import time
 from collections.abc import Callable
-from typing import Any
+from typing import Any, cast
 
 import pytest
 
 from brachium_wire import keys
-from brachium_wire.bus import PASSWORD_VARIABLE, Bus, Inbox, NoRouter
+from brachium_wire.bus import LEASE_MS, PASSWORD_VARIABLE, Bus, Inbox, NoRouter
 from brachium_wire.codec import decode
 from brachium_wire.heart import Heart
 from brachium_wire.messages import Answer, Health
@@ -60,6 +60,23 @@ def test_messages_arrive_whole_and_in_order(connect: Connect, until: Until) -> N
 
     until(complete, "500 messages")
     assert got == [(EVENT, number.to_bytes(2, "big") + b"\x00\xff" * 10) for number in range(500)]
+
+
+def test_a_late_answer_is_waited_for_until_a_dead_line_would_have_ended_the_wait() -> None:
+    waited_s: list[float] = []
+
+    class Session:
+        def get(self, _key: str, *, timeout: float, **_: Any) -> list[Any]:
+            waited_s.append(timeout)
+            return []
+
+        def liveliness(self) -> "Session":
+            return self
+
+    bus = Bus(cast(Any, Session()), "tcp/127.0.0.1:1")
+    assert bus.fetch(keys.everything("gym")) == []
+    assert bus.alive(keys.services("gym", "*/*/alive")) == []
+    assert [seconds > LEASE_MS / 1000 for seconds in waited_s] == [True, True]
 
 
 def test_info_stays_ahead_of_the_first_batch(connect: Connect, until: Until) -> None:

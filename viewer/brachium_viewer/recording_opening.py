@@ -5,7 +5,7 @@ import re
 from collections.abc import Iterable
 
 from brachium_wire import keys
-from brachium_wire.bus import Bus
+from brachium_wire.bus import ANSWERED_S, Bus
 from brachium_wire.codec import Drop, WireError, decode, encode
 from brachium_wire.messages import Answer, Command, Snapshot
 from brachium_wire.topics import TOPICS
@@ -36,7 +36,7 @@ def _subjects(names: Iterable[str]) -> list[str]:
 
 def _snapshot(bus: Bus, room: str, subject: str) -> tuple[str, bytes] | None:
     """Ask fusion for its state; None when nobody answers, or not with a snapshot."""
-    reply = bus.ask(keys.command(room, subject, "record"), encode(Command()))
+    reply = bus.ask(keys.command(room, subject, "record"), encode(Command()), timeout_s=ANSWERED_S)
     if reply is None:
         log.info("no fusion answered for %s: the recording begins without its state", subject)
         return None

@@ -117,7 +117,7 @@ class _Server:
 
     async def serve(self, stop: threading.Event) -> None:
         """Serve until `stop` is set."""
-        inboxes = self._listen()
+        inboxes = await asyncio.to_thread(self._listen)  # it waits for answers
         heart = Heart(self._bus, self._settings.room, "web", self._id)
         runner, address = await self._open()
         heart.text = address
