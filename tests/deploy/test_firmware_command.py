@@ -75,7 +75,7 @@ def test_a_node_is_told_line_by_line(answer: str, code: int, tmp_path: Path, cap
         words = ["--configure", str(tmp_path / "brachium.json"), "--serial", os.ttyname(there)]
         assert main(["firmware", *words]) == code
     finally:
-        node.join(60.0)
+        node.join(15.0)
         os.close(here)
         os.close(there)
     assert heard[0] == "setup"

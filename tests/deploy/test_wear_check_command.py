@@ -331,7 +331,7 @@ class Fusion:
 
     def __exit__(self, *_: object) -> None:
         self._stop.set()
-        self._thread.join(60.0)
+        self._thread.join(15.0)
         assert not self._thread.is_alive()
 
     def _run(self) -> None:

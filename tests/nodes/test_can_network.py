@@ -77,7 +77,7 @@ def running(settings: service.CanSettings) -> Iterator[None]:
         yield
     finally:
         stop.set()
-        thread.join(60.0)
+        thread.join(15.0)
         assert not thread.is_alive()
         assert failed == []
 

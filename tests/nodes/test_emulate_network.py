@@ -23,6 +23,8 @@ from brachium_wire.messages import SampleBatch, Session
 from brachium_wire.samples import read_samples
 
 ROOM = "test"
+ENDS_WITHIN_S = 15.0
+"""A service promises 2 s; a machine with much to do takes some times that. One that hangs is not excused."""
 FAULTS = FaultSettings(loss=0.05, burst_loss=0.01, burst_packets=4, swap=0.05, duplicate=0.05)
 
 
@@ -177,8 +179,8 @@ def test_twenty_wearers_keep_real_time_and_end_when_told(listener, endpoint) -> 
     thread.start()
     listener.until(lambda: len(listener.of("truth")) >= 20 * 100, "the truth of 20 arms for 2 s")
     stop.set()
-    thread.join(timeout=60.0)
-    assert not thread.is_alive(), "emulate did not end within 2 s"
+    thread.join(timeout=ENDS_WITHIN_S)
+    assert not thread.is_alive(), "emulate did not end"
     counts = [count for streams in reports[0].streams.values() for count in streams.values()]
     assert len(counts) == 60
     assert min(count.next_sequence for count in counts) >= 180  # no stream waited for another, nor for truth
@@ -244,8 +246,8 @@ def test_the_session_is_kept_for_who_comes_late(bus, endpoint, waiting) -> None:
         waiting(lambda: found.extend(bus.fetch(keys.session("late", "p01"))) or found, "the session")
     finally:
         stop.set()
-        thread.join(timeout=60.0)
-    assert not thread.is_alive(), "emulate did not end within 2 s"
+        thread.join(timeout=ENDS_WITHIN_S)
+    assert not thread.is_alive(), "emulate did not end"
     session = decode(found[0][1], Session)
     assert (session.side, session.height_m, session.facing_deg) == ("left", 1.8, 0.0)
 
@@ -280,7 +282,7 @@ def test_a_gateway_that_comes_back_finds_its_nodes_again(gateway, listener, endp
         listener.until(lambda: len(listener.of("imu")) >= seen + 5, "batches through the second gateway")
     finally:
         stop.set()
-        thread.join(timeout=60.0)
+        thread.join(timeout=ENDS_WITHIN_S)
     second.end()
     count = reports[0].streams["p01"]["hand_r"]
     assert count.dropped > 0
@@ -298,6 +300,6 @@ def test_waiting_for_a_gateway_ends_when_told(endpoint, bus, waiting, free_port)
     thread.start()
     waiting(lambda: bus.alive(keys.alive(ROOM, "emulate", "emulate")), "the emulator on the bus")
     stop.set()
-    thread.join(timeout=60.0)
-    assert not thread.is_alive(), "emulate did not end within 2 s"
+    thread.join(timeout=ENDS_WITHIN_S)
+    assert not thread.is_alive(), "emulate did not end"
     assert {count.sent for count in reports[0].streams["p01"].values()} == {0}

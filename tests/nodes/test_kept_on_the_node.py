@@ -120,7 +120,7 @@ class Joined:
     def leave(self) -> None:
         asyncio.run_coroutine_threadsafe(self._client.leave(0), self._loop).result(10)
         self._loop.call_soon_threadsafe(self._loop.stop)
-        self._thread.join(60.0)
+        self._thread.join(15.0)
         self._loop.close()
 
 

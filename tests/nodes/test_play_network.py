@@ -18,6 +18,8 @@ from brachium_wire.recording import RecordingError, RecordingWriter, read
 from brachium_wire.samples import read_samples
 
 ROOM = "test"
+ENDS_WITHIN_S = 15.0
+"""A service promises 2 s; a machine with much to do takes some times that. One that hangs is not excused."""
 
 
 def segment(
@@ -225,6 +227,6 @@ def test_playback_ends_when_told(listener, folder, endpoint) -> None:
     thread.start()
     listener.until(lambda: len(listener.of("info")) == 2, "both infos")
     stop.set()
-    thread.join(timeout=60.0)
-    assert not thread.is_alive(), "play did not end within 2 s"
+    thread.join(timeout=ENDS_WITHIN_S)
+    assert not thread.is_alive(), "play did not end"
     listener.until_gone(2)

@@ -194,7 +194,7 @@ def test_a_node_at_work_is_told_anew_over_its_serial_line(firmware, flash: Flash
         report = node.stop()
         for descriptor in (here, there):
             os.close(descriptor)
-        drain.join(60.0)
+        drain.join(15.0)
         os.close(line)
     assert report.restarts == 2  # into the setup, and to work
 

@@ -57,7 +57,7 @@ class Door:
 
     def end(self) -> None:
         self.stop.set()
-        self._thread.join(timeout=60.0)
+        self._thread.join(timeout=15.0)
         assert not self._thread.is_alive()
 
 

@@ -14,6 +14,9 @@ from brachium_wire.topics import TOPICS
 
 pytestmark = pytest.mark.network
 
+ENDS_WITHIN_S = 15.0
+"""A service promises 2 s; a machine with much to do takes some times that. One that hangs is not excused."""
+
 
 @pytest.fixture
 def free_port(unused_port: Callable[[], int]) -> int:
@@ -29,8 +32,8 @@ def running(settings: RouterSettings) -> Iterator[None]:
         yield
     finally:
         stop.set()
-        thread.join(60.0)
-        assert not thread.is_alive(), "the router must end within 2 s"
+        thread.join(ENDS_WITHIN_S)
+        assert not thread.is_alive(), "the router did not end"
 
 
 def test_it_shows_its_health_and_a_token(free_port):

@@ -24,6 +24,8 @@ from brachium_wire.messages import SegmentPose, Skeleton
 
 LENGTHS = (0.31, 0.26, 0.18)
 START_S = 60.0
+ENDS_WITHIN_S = 15.0
+"""A service promises 2 s; a machine with much to do takes some times that. One that hangs is not excused."""
 
 
 @pytest.fixture
@@ -92,7 +94,7 @@ def router_endpoint() -> Iterator[str]:
     thread.start()
     yield endpoint(settings)
     stop.set()
-    thread.join(60.0)
+    thread.join(ENDS_WITHIN_S)
     assert not thread.is_alive()
 
 
@@ -131,13 +133,13 @@ def _view(endpoint: str, **settings: object) -> Iterator[Running]:
         yield running
     finally:
         running.stop.set()
-        running.thread.join(60.0)
-        assert not running.thread.is_alive(), "the view must end within 2 s"
+        running.thread.join(ENDS_WITHIN_S)
+        assert not running.thread.is_alive(), "the view did not end"
 
 
 @pytest.fixture
 def open_view() -> Callable[..., AbstractContextManager[Running]]:
-    """The view of a router's room as a context manager; it must end within 2 s."""
+    """The view of a router's room as a context manager; it must end when told."""
     return _view
 
 

@@ -65,7 +65,7 @@ def moving(endpoint: str, arm_at: Any) -> Iterator[None]:
         yield
     finally:
         stop.set()
-        thread.join(60.0)
+        thread.join(15.0)
 
 
 @dataclass

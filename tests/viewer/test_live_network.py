@@ -95,13 +95,13 @@ def test_a_frozen_viewer_holds_nobody_up_and_fills_no_memory(router_endpoint, ar
         later, frozen = watch(inbox, send, stands), marks[0]
         assert later.counts["received"] > frozen.counts["received"]
         assert later.counts["overflow"] == 0
-    assert running.error is None  # and it ended within 2 s, its viewer still frozen
+    assert running.error is None  # and it ended, its viewer still frozen
 
 
 def test_the_end_of_the_viewer_is_the_end_of_the_view_and_says_why(router_endpoint, open_view):
     with open_view(router_endpoint) as running:
         os.kill(viewer_pid(), signal.SIGKILL)
-        running.thread.join(60.0)
+        running.thread.join(15.0)
         assert not running.thread.is_alive()
     assert isinstance(running.error, ViewError)
     assert "ended with code -9" in str(running.error)

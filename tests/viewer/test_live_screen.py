@@ -40,7 +40,7 @@ def test_take_waits_until_something_is_put():
     thread = threading.Thread(target=lambda: got.append(mailbox.take()))
     thread.start()
     mailbox.put(2.0, {"a": Lane("held")})
-    thread.join(60.0)
+    thread.join(15.0)
     assert got == [{"a": (2.0, Lane("held"))}]
 
 

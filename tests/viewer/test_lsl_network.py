@@ -102,7 +102,7 @@ class Lab:
 
     def end(self) -> None:
         self.stop.set()
-        self._thread.join(timeout=60.0)
+        self._thread.join(timeout=15.0)
         assert not self._thread.is_alive()
         self.bus.close()
 
@@ -158,7 +158,7 @@ def test_samples_come_with_our_time_in_lsls_clock_their_labels_and_nothing_behin
     assert rows[:5, :3].tolist() == values.tolist()
     wanted = [ours.lsl(t) for t in [*times, start + 60_000_000]]
     off_ns = ours.uncertainty_ns + lab.uncertainty_ns(7)
-    assert at == pytest.approx(wanted, abs=off_ns * 1e-9 + 5e-4)
+    assert at == pytest.approx(wanted, abs=off_ns * 1e-9 + 1e-6)
     assert np.diff(at[:5]) == pytest.approx([0.01] * 4, abs=1e-6)
     until(lambda: lab.listen() and lab.health.drops.get("time_backwards"), "the drops")
     assert (lab.health.drops["late"], lab.health.drops["time_backwards"]) == (1, 1)
@@ -245,7 +245,7 @@ def test_a_host_that_begins_anew_with_another_time_goes_on_in_lsls(lab: Lab, pyl
     lab.samples([lab.clock.now_ns()], np.zeros((1, 3)))
     after = pylsl.local_clock()
     _, second = pulled(inlet, 1)
-    off_s = lab.uncertainty_ns(3) * 1e-9 + 5e-4
+    off_s = lab.uncertainty_ns(3) * 1e-9 + 1e-6
     assert before - off_s <= second[-1] <= after + off_s
     assert second[-1] > first[-1]
 

@@ -33,7 +33,7 @@ def bus() -> Iterator[Bus]:
     with Bus.open(f"tcp/127.0.0.1:{port}") as bus:
         yield bus
     stop.set()
-    thread.join(60.0)
+    thread.join(15.0)
     assert not thread.is_alive()
 
 

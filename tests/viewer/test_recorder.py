@@ -46,7 +46,7 @@ def endpoint() -> Iterator[str]:
     thread.start()
     yield f"tcp/127.0.0.1:{port}"
     stop.set()
-    thread.join(60.0)
+    thread.join(15.0)
     assert not thread.is_alive()
 
 

@@ -498,7 +498,7 @@ def test_stop_ends_the_wait_for_a_router(router: Any, caplog: pytest.LogCaptureF
     with caplog.at_level(logging.CRITICAL, "brachium_wire.bus"):
         waiting.start()
         stop.set()
-        waiting.join(60.0)
+        waiting.join(15.0)
     assert not waiting.is_alive()
     assert "stopped while waiting" in str(said[0])
 
@@ -514,7 +514,7 @@ def test_a_router_that_comes_later_is_found(router: Any, caplog: pytest.LogCaptu
     with caplog.at_level(logging.CRITICAL, "brachium_wire.bus"):
         waiting.start()
         router.start()
-        waiting.join(60.0)
+        waiting.join(15.0)
     assert opened[0].connected()
     opened[0].close()
 

@@ -4,6 +4,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
+from brachium_body.ranges import Range
+
 Plane = Literal["abduction", "scaption", "flexion", "extension"]
 
 PLANES_DEG: Mapping[Plane, tuple[float, float]] = {
@@ -131,3 +133,19 @@ EXERCISES: Mapping[str, Exercise] = {
 def exercise(name: str) -> Exercise:
     """Return the row of this name; one that the table does not hold is measured as free movement."""
     return EXERCISES.get(name, EXERCISES["free"])
+
+
+def held_against(table: Mapping[str, Range], row: Exercise) -> Range | None:
+    """Return what a table of ranges (brachium_body.ranges) says of the angle that an exercise is measured in.
+
+    An elevation in a plane that has a name is held against that movement, from 0 on; in any other there is none.
+    """
+    if row.angle != "isb_elevation":
+        return table.get(row.angle)
+    if row.plane == "extension":
+        flexion = table.get("shoulder_flexion")
+        return None if flexion is None or flexion.low is None else Range(0.0, -flexion.low)
+    found = table.get(
+        {"flexion": "shoulder_flexion", "abduction": "shoulder_abduction"}.get(row.plane or "", "")
+    )
+    return None if found is None else Range(0.0, found.high)

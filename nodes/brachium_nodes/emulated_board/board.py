@@ -67,7 +67,7 @@ class Board:
         self._cell = Cell(self.settings.cell)
         self._random = random.Random(self.feed.start_us)
         self._drained_us = self.clock()
-        self._stalls = self.settings.stall_us is not None
+        self._stall_us = self.settings.stall_us
         self.reset()
 
     def reset(self) -> None:
@@ -125,10 +125,8 @@ class Board:
 
     def _refuse(self) -> None:
         settings = self.settings
-        begun_us = self.chip.begun_us
-        due = begun_us is not None and self.clock() - begun_us >= (settings.stall_us or 0)
-        if self._stalls and due:
-            self._stalls = False
+        if self._stall_us is not None and self.chip.worked_us() >= self._stall_us:
+            self._stall_us = None
             self.pause(settings.stall_ms)
         self.counts.transactions += 1
         if settings.refusals and self._random.random() < settings.refusals:

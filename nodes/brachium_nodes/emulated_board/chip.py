@@ -27,8 +27,7 @@ class Chip:
         self._first = self._end = 0  # numbers of the samples in the FIFO
         self._part = 0  # bytes of the first one that are read
         self.gathers = False
-        self.begun_us: int | None = None
-        """When it first gathered."""
+        self._begun_us: int | None = None
         self.lost = False
         self.overflows = 0
 
@@ -59,8 +58,12 @@ class Chip:
         """Begin to gather from now on, or stop; either way the FIFO is empty then."""
         self._first = self._end = self.feed.due() if on else 0
         self.gathers, self._part, self.lost = on, 0, False
-        if on and self.begun_us is None:
-            self.begun_us = self.clock()
+        if on and self._begun_us is None:
+            self._begun_us = self.clock()
+
+    def worked_us(self) -> int:
+        """Return how long ago it first began to gather; 0 before."""
+        return 0 if self._begun_us is None else self.clock() - self._begun_us
 
     def size(self) -> int:
         """Return how many bytes the FIFO holds."""

@@ -55,7 +55,7 @@ def _serving(**settings: object) -> Iterator[Serving]:
         yield one
     finally:
         one.stop.set()
-        one.thread.join(60.0)
+        one.thread.join(15.0)
         assert not one.thread.is_alive()
 
 
@@ -143,7 +143,7 @@ def wear(router_endpoint: str, arm_at) -> Callable[..., AbstractContextManager[s
             yield router_endpoint
         finally:
             stop.set()
-            thread.join(60.0)
+            thread.join(15.0)
 
     return worn
 

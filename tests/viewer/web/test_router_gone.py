@@ -30,7 +30,7 @@ class Router:
 
     def end(self) -> None:
         self.stop.set()
-        self.thread.join(60.0)
+        self.thread.join(15.0)
         assert not self.thread.is_alive()
 
 

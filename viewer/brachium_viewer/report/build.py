@@ -8,7 +8,7 @@ import numpy as np
 from brachium_body.ranges import FUNCTIONAL, REFERENCE, Range
 from brachium_body.segments import Side
 from brachium_viewer.contents import Contents
-from brachium_viewer.exercises import Exercise
+from brachium_viewer.exercises import held_against
 from brachium_viewer.metrics.arm_motion import ArmMotion
 from brachium_viewer.metrics.both_arms import Components, components
 from brachium_viewer.metrics.set_measures import SetMeasures
@@ -115,8 +115,8 @@ def range_bars(report: Report) -> list[RangeBar]:
                 now=now,
                 other=None if other is None else _ends(other.pooled),
                 last=None if before is None or not before.changes else _ends(before.pooled),
-                reference=_known(REFERENCE, group.exercise),
-                need=_known(FUNCTIONAL, group.exercise),
+                reference=_span(held_against(REFERENCE, group.exercise)),
+                need=_span(held_against(FUNCTIONAL, group.exercise)),
             )
         )
     return bars
@@ -127,21 +127,8 @@ def _ends(measures: SetMeasures) -> tuple[float, float] | None:
     return None if start is None or peak is None else (start, peak)
 
 
-def _known(table: Mapping[str, Range], exercise: Exercise) -> tuple[float, float] | None:
-    """Return a reference in the angle that the exercise is measured in."""
-    if exercise.angle != "isb_elevation":
-        found = table.get(exercise.angle)
-    elif exercise.plane == "extension":
-        flexion = table.get("shoulder_flexion")
-        found = None if flexion is None or flexion.low is None else Range(0.0, -flexion.low)
-    elif exercise.plane in ("flexion", "abduction"):
-        found = table.get(f"shoulder_{exercise.plane}")
-        found = None if found is None else Range(0.0, found.high)
-    else:
-        found = None
-    if found is None or found.low is None or found.high is None:
-        return None
-    return found.low, found.high
+def _span(found: Range | None) -> tuple[float, float] | None:
+    return None if found is None or found.low is None or found.high is None else (found.low, found.high)
 
 
 def principal_components(report: Report) -> list[tuple[Group, Components | None]]:

@@ -11,7 +11,7 @@ from brachium_viewer.web import requests as r
 from brachium_viewer.web.page_state import PageState
 from brachium_viewer.web.session_desk import NoRecording, SessionDesk, Unreached
 from brachium_wire import keys
-from brachium_wire.bus import Bus
+from brachium_wire.bus import LEASE_MS, Bus
 from brachium_wire.codec import WireError, decode, encode
 from brachium_wire.hosttime import HostClock
 from brachium_wire.messages import Answer, Command, Session
@@ -25,9 +25,9 @@ LONGEST_S = 300.0
 HEARD_S = 1.0
 BACK_S = 0.5
 """Between two looks whether the recording can be reached again."""
-OWED_S = 5.0
-"""A report waits so long for the end of a set: a look at a router that vanished takes 4 s, until its line is
-noticed to be dead."""
+OWED_S = LEASE_MS / 1000 + 2 * BACK_S
+"""A report waits so long for the end of a set: a look at a router that vanished takes until its line is noticed
+to be dead."""
 STOPPED_UNWRITTEN = (
     "stopped, but that is not written yet: it is as soon as the router and the recorder are back"
 )

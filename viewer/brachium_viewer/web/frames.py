@@ -10,7 +10,7 @@ import numpy as np
 
 from brachium_body.ranges import FUNCTIONAL, REFERENCE, Range
 from brachium_body.segments import part_of
-from brachium_viewer.exercises import EXERCISES, Exercise
+from brachium_viewer.exercises import EXERCISES, Exercise, held_against
 from brachium_viewer.health_records import NodeHealth
 from brachium_viewer.marks import ExerciseBegins
 from brachium_viewer.scene import lean
@@ -142,30 +142,15 @@ def hello(room: str) -> Json:
 
 
 def _exercise(row: Exercise) -> Json:
-    band, need = _bands(row)
+    band, need = held_against(REFERENCE, row), held_against(FUNCTIONAL, row)
     return {
         "name": row.name,
         "angle": row.angle,
         "rises": row.rises,
         "goal_deg": row.goal_deg,
-        "band": band,
-        "need": need,
+        "band": None if band is None else _pair(band),
+        "need": None if need is None else need.high if row.rises else need.low,
     }
-
-
-def _bands(row: Exercise) -> tuple[list[float | None] | None, float | None]:
-    """Return the reference band of an exercise's angle, and what daily activities need of it.
-
-    An elevation in a plane that has a name is held against that movement's range; in any other there is none.
-    """
-    if row.angle in REFERENCE:
-        need = FUNCTIONAL.get(row.angle)
-        return _pair(REFERENCE[row.angle]), None if need is None else need.high if row.rises else need.low
-    if row.plane == "extension":
-        low, needed = REFERENCE["shoulder_flexion"].low, FUNCTIONAL["shoulder_flexion"].low
-        return [0.0, None if low is None else -low], None if needed is None else -needed
-    name = {"flexion": "shoulder_flexion", "abduction": "shoulder_abduction"}.get(row.plane or "")
-    return (None, None) if name is None else ([0.0, REFERENCE[name].high], FUNCTIONAL[name].high)
 
 
 def _pair(row: Range) -> list[float | None]:

@@ -12,9 +12,10 @@ const GAP_S = 0.3;
 const COLOURS = ["--muted", "--line", "--trace", "--band", "--bad", "--good", "--ink", "--goal", "--surface"];
 
 /** Where a word stands under an edge so that none of the lines goes through it. */
-function below(edge, lines, ratio) {
-  const clear = 15 * ratio;
-  return lines.sort((a, b) => a - b).reduce((y, line) => (line > y - clear && line < y + 3 * ratio ? line + clear : y), edge + clear);
+function under(edge, lines, ratio) {
+  const high = 15 * ratio;
+  const crosses = (y, line) => line > y - high && line < y + 3 * ratio;
+  return lines.sort((a, b) => a - b).reduce((y, line) => (crosses(y, line) ? line + high : y), edge + high);
 }
 
 export class Chart {
@@ -163,7 +164,7 @@ export class Chart {
     }
     if (band) {
       const lines = [need, goal, limit].filter((value) => value != null).map(at);
-      this.word(ctx, say("reference"), bbox.left + 6 * ratio, below(at(band[1]), lines, ratio), "--good", "left");
+      this.word(ctx, say("reference"), bbox.left + 6 * ratio, under(at(band[1]), lines, ratio), "--good", "left");
     }
     const right = bbox.left + bbox.width - 6 * ratio;
     this.line(ctx, bbox, need, at, "--ink", [2, 4], say("need"), bbox.left + 0.45 * bbox.width, -6);

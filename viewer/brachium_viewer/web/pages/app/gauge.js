@@ -20,6 +20,10 @@ function element(name, words, text) {
   return one;
 }
 
+const written = (word, value) => `${word} ${number(value)}°`;
+
+const touch = ([from, to], [start, end]) => from < end + LETTER && start < to + LETTER;
+
 /** A text in lines of so many letters. */
 function broken(text, letters) {
   return text.split(" ").reduce((lines, word) => {
@@ -70,7 +74,7 @@ export class Gauge {
       this.tick("limit", limit, say("limit"), BELOW);
     }
     if (goal != null) this.tick("goal", goal, say("goal"), ABOVE);
-    const close = limit != null && need != null && this.touch(this.span(limit, say("limit")), this.span(need, say("need")));
+    const close = limit != null && need != null && touch(this.span(limit, say("limit")), this.span(need, say("need")));
     if (need != null) this.tick("need", need, say("need"), close ? BELOW + ROW : BELOW);
     const rows = close ? 2 : limit != null || need != null ? 1 : 0;
     const legend = band ? say("reference.range", { low: number(band[0]), high: number(band[1]) }) : say("reference.none");
@@ -87,7 +91,7 @@ export class Gauge {
   tick(kind, value, word, y) {
     const x = this.at(value);
     this.svg.append(element("path", { class: kind, d: `M${x} ${TOP - 5}V${TOP + HIGH + 5}` }));
-    this.svg.append(element("text", { class: `${kind}-word`, x, y, "text-anchor": this.anchor(x) }, `${word} ${number(value)}°`));
+    this.svg.append(element("text", { class: `${kind}-word`, x, y, "text-anchor": this.anchor(x) }, written(word, value)));
   }
 
   /** How a word stands at its tick: towards the middle from either end. */
@@ -98,13 +102,9 @@ export class Gauge {
   /** From where to where a tick's word goes. */
   span(value, word) {
     const x = this.at(value);
-    const long = LETTER * `${word} ${number(value)}°`.length;
+    const long = LETTER * written(word, value).length;
     const from = { end: x - long, start: x, middle: x - long / 2 }[this.anchor(x)];
     return [from, from + long];
-  }
-
-  touch([from, to], [start, end]) {
-    return from < end + LETTER && start < to + LETTER;
   }
 
   at(value) {
