@@ -138,14 +138,12 @@ def exercise(name: str) -> Exercise:
 def held_against(table: Mapping[str, Range], row: Exercise) -> Range | None:
     """Return what a table of ranges (brachium_body.ranges) says of the angle that an exercise is measured in.
 
-    An elevation in a plane that has a name is held against that movement, from 0 on; in any other there is none.
+    An elevation in a plane that has a name is held against that movement, from 0 on; any other against none.
     """
     if row.angle != "isb_elevation":
         return table.get(row.angle)
     if row.plane == "extension":
         flexion = table.get("shoulder_flexion")
         return None if flexion is None or flexion.low is None else Range(0.0, -flexion.low)
-    found = table.get(
-        {"flexion": "shoulder_flexion", "abduction": "shoulder_abduction"}.get(row.plane or "", "")
-    )
+    found = table.get(f"shoulder_{row.plane}")
     return None if found is None else Range(0.0, found.high)

@@ -26,8 +26,8 @@ HEARD_S = 1.0
 BACK_S = 0.5
 """Between two looks whether the recording can be reached again."""
 OWED_S = LEASE_MS / 1000 + 2 * BACK_S
-"""A report waits so long for the end of a set: a look at a router that vanished takes until its line is noticed
-to be dead."""
+"""A report waits so long for the end of a set: a look at a router that vanished takes until its line is
+noticed to be dead."""
 STOPPED_UNWRITTEN = (
     "stopped, but that is not written yet: it is as soon as the router and the recorder are back"
 )
