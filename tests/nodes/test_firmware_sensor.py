@@ -2,11 +2,23 @@
 
 import pytest
 
-WORLD = """
+CHECKED = """
 import random
 import sensor
 from device_clock import SampleClock
 
+class Batches:
+    # How often each distance was seen between a sample's number and the one that it has by its content.
+    def __init__(self):
+        self.shifts = {}
+    def add(self, number, taken, data, at, field):
+        shift = int.from_bytes(data[at : at + 4], "big") - number
+        self.shifts[shift] = self.shifts.get(shift, 0) + 1
+
+"""
+WORLD = (
+    CHECKED
+    + """
 PERIOD, ROOM = 10000.4, 85
 
 class Bus:
@@ -35,7 +47,7 @@ class Bus:
             self.first, self.lost = self.end - ROOM, True
 
 class Driver:
-    magnetometer, room = True, ROOM
+    magnetometer, room, at_once = True, ROOM, 16
     def __init__(self, bus):
         self.bus = bus
     def start(self, rate_hz):
@@ -58,13 +70,6 @@ class Driver:
         self.bus.transfer("field")
         return True
 
-class Batches:
-    def __init__(self):
-        self.shifts = {}
-    def add(self, number, taken, data, at, field):
-        shift = int.from_bytes(data[at : at + 4], "big") - number
-        self.shifts[shift] = self.shifts.get(shift, 0) + 1
-
 def worn(seed, stalls_at, refuses=(0, 0)):
     bus, batches = Bus(seed, stalls_at, refuses), Batches()
     sensor.found = lambda _: Driver(bus)
@@ -82,6 +87,59 @@ def worn(seed, stalls_at, refuses=(0, 0)):
 
 print(json.dumps([worn(seed, *given) for seed in range(40)]))
 """
+)
+
+CHIP = (
+    CHECKED
+    + """
+class Bus:
+    # A chip at its registers: 18 samples gather between two looks, and 3 transfers in 100 are refused.
+    def __init__(self, who, at, counted_at, read_at, packet, start):
+        self.who, self.who_at, self.counted_at, self.read_at = who, at, counted_at, read_at
+        self.packet, self.start = packet, start
+        self.waiting = self.next = 0
+        self.sure = True
+    def readfrom_mem(self, address, register, size):
+        data = bytearray(size)
+        self.readfrom_mem_into(address, register, data)
+        return data
+    def readfrom_mem_into(self, address, register, data):
+        if not self.sure and random.random() < 0.03:
+            raise OSError(5)
+        for at in range(len(data)):
+            data[at] = 0
+        if register == self.who_at and address == 0x68:
+            data[0] = self.who
+        elif register == 0 and address == 0x0c:
+            data[0] = 0x48
+        elif register == self.counted_at:
+            size = self.waiting * self.packet
+            data[0], data[1] = size >> 8, size & 255
+        elif register == self.read_at:
+            for at in range(0, len(data), self.packet):
+                assert self.waiting, "more was read than had gathered"
+                data[at + self.start : at + self.start + 4] = self.next.to_bytes(4, "big")
+                self.next, self.waiting = self.next + 1, self.waiting - 1
+    def writeto_mem(self, address, register, data):
+        pass
+
+def worn(seed, chip):
+    random.seed(seed)
+    bus, batches, us = Bus(*chip), Batches(), 5000000
+    one = sensor.Sensor(bus, 100, SampleClock, batches)
+    one.start(lambda: us)
+    bus.sure = False
+    for _ in range(60):
+        us += 180000
+        bus.waiting += 18
+        one.poll(lambda: us)
+    bus.sure = True
+    one.poll(lambda: us)
+    return [len(batches.shifts), sum(batches.shifts.values()), bus.next, one.errors > 0]
+
+print(json.dumps([worn(seed, given) for seed in range(5)]))
+"""
+)
 
 
 @pytest.mark.parametrize("where", ["count", "read", "field"])
@@ -100,3 +158,17 @@ def test_a_sensor_that_is_started_anew_goes_on_with_its_own_numbers(on_chip, sta
         assert len(counts) == 1
         assert counts[0] > 200
         assert restarts == 1
+
+
+@pytest.mark.parametrize(
+    "chip",
+    [
+        pytest.param([0x71, 0x75, 0x72, 0x74, 12, 0], id="MPU-9250"),
+        pytest.param([0x47, 0x75, 0x2E, 0x30, 16, 1], id="ICM-42688-P"),
+    ],
+)
+def test_a_refusal_amid_many_waiting_samples_costs_none_of_them(on_chip, chip):
+    for shifts, kept, read, refused in on_chip(CHIP, chip):
+        assert refused
+        assert shifts == 1
+        assert kept == read == 1080

@@ -18,10 +18,11 @@ class Driver:
     gyr_step = 0.017453293 / 16.4  # rad/s, at 2000 deg/s
     mag_step = None
     room = _SIZE // _PACKET
+    at_once = 8
 
     def __init__(self, bus, address, who):
         self._bus, self._address, self.chip = bus, address, CHIPS[who]
-        self._one, self._two, self._packets = bytearray(1), bytearray(2), bytearray(4 * _PACKET)
+        self._one, self._two, self._packets = bytearray(1), bytearray(2), bytearray(self.at_once * _PACKET)
 
     def start(self, rate_hz):
         """Reset and configure the chip; return the rate in Hz that it will really have, by its data sheet."""
@@ -53,13 +54,10 @@ class Driver:
 
     def read(self, into):
         """Fill `into` with the oldest samples, 12 bytes each as in the registers: acceleration, rate."""
-        packets, done, size = self._packets, 0, len(into)
-        while done < size:
-            now = min((size - done) // 12, len(packets) // _PACKET)
-            self._bus.readfrom_mem_into(self._address, 0x30, memoryview(packets)[: now * _PACKET])
-            for i in range(now):
-                into[done : done + 12] = packets[i * _PACKET + 1 : i * _PACKET + 13]
-                done += 12
+        packets, count = self._packets, len(into) // 12
+        self._bus.readfrom_mem_into(self._address, 0x30, memoryview(packets)[: count * _PACKET])
+        for i in range(count):
+            into[12 * i : 12 * i + 12] = packets[i * _PACKET + 1 : i * _PACKET + 13]
 
     def field(self, into):  # noqa: ARG002 (as every driver)
         """There is no magnetometer."""

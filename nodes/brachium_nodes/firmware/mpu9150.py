@@ -1,8 +1,8 @@
 """MPU-9150 and MPU-9250: inertial sensor with FIFO, and the AK8975 or AK8963 magnetometer behind it.
 
 Registers and figures are those of the makers' register maps. Every driver has the same few names: chip,
-big_endian, magnetometer, acc_step, gyr_step, mag_step, room (samples that fit in the FIFO), start, empty,
-gathered, read and field; in all of these the bus may raise OSError.
+big_endian, magnetometer, acc_step, gyr_step, mag_step, room (samples that fit in the FIFO), at_once (samples
+that one transfer brings), start, empty, gathered, read and field; in all of these the bus may raise OSError.
 """
 
 import struct
@@ -22,6 +22,7 @@ class Driver:
     magnetometer = True
     acc_step = 9.80665 / 4096  # m/s^2, at 8 g
     gyr_step = 0.017453293 / 16.4  # rad/s, at 2000 deg/s
+    at_once = 16
 
     def __init__(self, bus, address, who):
         self._bus, self._address, self.chip = bus, address, CHIPS[who]
@@ -74,7 +75,10 @@ class Driver:
         return size // _SAMPLE
 
     def read(self, into):
-        """Fill `into` with the oldest samples, 12 bytes each as in the registers: acceleration, rate."""
+        """Fill `into` with the oldest samples, 12 bytes each as in the registers: acceleration, rate.
+
+        At most `at_once`, for what one transfer has taken out a refused second one would lose.
+        """
         self._bus.readfrom_mem_into(self._address, 0x74, into)
 
     def field(self, into):

@@ -7,7 +7,6 @@ KNOWN = {
     (0x75, 0x47): "icm42688",
 }  # what a register says, and the driver for it; another chip: one more file with the same names
 ADDRESSES = (0x68, 0x69)
-READ_AT_ONCE = 16
 SILENT_US = 2_000_000
 
 
@@ -34,7 +33,7 @@ class Sensor:
         self._make_clock = make_clock
         self.driver = self.clock = None
         self.rate_hz = rate_hz
-        self._data, self._field = bytearray(12 * READ_AT_ONCE), bytearray(6)
+        self._data, self._field = None, bytearray(6)
         self._heard = 0
         self._broken = False
         self.errors = self.overflows = self.restarts = 0
@@ -45,6 +44,7 @@ class Sensor:
         rate_hz = self.driver.start(self._asked_hz)
         if self.clock is None:
             self.rate_hz, self.clock = rate_hz, self._make_clock(rate_hz)
+            self._data = bytearray(12 * self.driver.at_once)
         else:
             self._broken = True  # nobody knows which samples the start has thrown away
         self._heard = now()
@@ -82,7 +82,7 @@ class Sensor:
             return
         clock.read(before, now(), waiting)
         while waiting:
-            part = memoryview(self._data)[: 12 * min(waiting, READ_AT_ONCE)]
+            part = memoryview(self._data)[: 12 * min(waiting, driver.at_once)]
             self._read(part)
             if waiting + clock.count(now() - before) >= driver.room:
                 self._overflow(now)  # since they were counted: what was read may not be the oldest
