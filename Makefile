@@ -29,8 +29,9 @@ check: $(VENV)/dev.stamp
 	$(BIN)/pyright --pythonpath $(BIN)/python
 	$(BIN)/lint-imports
 
+# Many tests wait for processes: three at a time keep two cores busy.
 pytest: $(VENV)/dev.stamp
-	$(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder $(ARGS)
+	$(BIN)/python -m pytest -n 3 --dist loadfile --no-loadscope-reorder $(ARGS)
 
 prove: $(VENV)/demo.stamp
 	$(BIN)/brachium prove --out docs/figures $(ARGS)
