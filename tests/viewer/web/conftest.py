@@ -78,12 +78,15 @@ class Screen:
         for message in self.last.values():
             if found(message):
                 return message
-        async with asyncio.timeout(timeout_s):
-            while True:
-                message = json.loads((await self.socket.receive()).data)
-                self.last[message["kind"]] = message
-                if found(message):
-                    return message
+        try:
+            async with asyncio.timeout(timeout_s):
+                while True:
+                    message = json.loads((await self.socket.receive()).data)
+                    self.last[message["kind"]] = message
+                    if found(message):
+                        return message
+        except TimeoutError:
+            raise AssertionError(f"not within {timeout_s:g} s; heard last: {self.last}") from None
 
     async def ask(self, verb: str, **words: object) -> dict:
         self.number += 1

@@ -173,3 +173,19 @@ def test_exercises_of_the_shoulder_are_held_against_their_movements_reference():
     assert (rows["shoulder-abduction"]["band"], rows["shoulder-abduction"]["need"]) == ([0.0, 180.0], 128.0)
     assert (rows["shoulder-extension"]["band"], rows["shoulder-extension"]["need"]) == ([0.0, 60.0], 46.0)
     assert rows["scapular-elevation"]["band"] is None
+
+
+def test_a_mark_has_the_time_of_the_samples_though_an_arm_is_silent_and_this_clock_is_another(arm_at):
+    state = PageState("lab")
+    assert state.instant_ns(5 * S) == 5 * S
+    for side, heard_s, taken_s in (("left", 4.0, 2000.0), ("right", 5.0, 1000.0)):
+        skeleton = arm_at(0.0, side=side, time_ns=round(S * taken_s))
+        state.feed(keys.skeleton("lab", "p01", side), encode(skeleton), round(S * heard_s))
+    assert state.instant_ns(5 * S) == 1000 * S
+    begun_ns = state.instant_ns(7 * S)
+    assert begun_ns == 1002 * S
+    state.begin(ExerciseBegins(exercise="free", side="right"), begun_ns)
+    late = arm_at(3.0, time_ns=1003 * S)
+    state.feed(keys.skeleton("lab", "p01", "right"), encode(late), 8 * S)
+    assert state.running is not None
+    assert state.running.progress().angle_deg is not None

@@ -120,9 +120,12 @@ class PageState:
         return subject in self._subjects
 
     def instant_ns(self, now_ns: int) -> int:
-        """Return the instant of the newest skeleton shown, or `now_ns` when there is none: a mark's time."""
-        live = [a.skeleton.time_ns for a in self._arms().values() if now_ns - a.heard_ns < MISSING_NS]
-        return max(live, default=now_ns)
+        """Return a mark's time: now, by the clock of the arm heard last; `now_ns` when none was heard.
+
+        This machine's clock may be minutes off that of the samples, which an arm held up for a moment keeps.
+        """
+        last = max(self._arms().values(), key=lambda arm: arm.heard_ns, default=None)
+        return now_ns if last is None else last.skeleton.time_ns + now_ns - last.heard_ns
 
     def sides(self) -> list[str]:
         """Return the arms of the subject shown that skeletons come of."""
