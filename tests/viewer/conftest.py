@@ -4,7 +4,6 @@ import ast
 import errno
 import os
 import re
-import socket
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
@@ -83,12 +82,9 @@ def arm_at() -> Callable[..., Skeleton]:
 
 
 @pytest.fixture
-def router_endpoint() -> Iterator[str]:
+def router_endpoint(unused_port: Callable[[], int]) -> Iterator[str]:
     """The endpoint of a router that runs as long as the test."""
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        port = int(probe.getsockname()[1])
-    settings = RouterSettings(port=port)
+    settings = RouterSettings(port=unused_port())
     stop = threading.Event()
     thread = threading.Thread(target=run_router, args=(settings, stop))
     thread.start()

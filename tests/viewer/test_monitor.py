@@ -2,9 +2,8 @@
 
 import io
 import json
-import socket
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import pytest
@@ -23,10 +22,8 @@ ROOM = "gym"
 
 
 @pytest.fixture
-def bus() -> Iterator[Bus]:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        port = probe.getsockname()[1]
+def bus(unused_port: Callable[[], int]) -> Iterator[Bus]:
+    port = unused_port()
     stop = threading.Event()
     thread = threading.Thread(target=router.run, args=(RouterSettings(room=ROOM, port=port), stop))
     thread.start()

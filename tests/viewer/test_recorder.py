@@ -1,6 +1,5 @@
 """The recorder on a real bus: it begins with fusion's state, and loses nothing that it received."""
 
-import socket
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -37,10 +36,8 @@ def until(true: Callable[[], bool], seconds: float = 60.0) -> None:
 
 
 @pytest.fixture(scope="module")
-def endpoint() -> Iterator[str]:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        port = probe.getsockname()[1]
+def endpoint(unused_port: Callable[[], int]) -> Iterator[str]:
+    port = unused_port()
     stop = threading.Event()
     thread = threading.Thread(target=router.run, args=(RouterSettings(room=ROOM, port=port), stop))
     thread.start()

@@ -24,11 +24,8 @@ from brachium_wire import keys
 from brachium_wire.codec import decode, decode_topic, encode
 from brachium_wire.messages import SampleBatch, Session, Skeleton
 
-MS = 1_000_000
-TICK = 20 * MS
 FLOAT32 = 1e-6
 """What float32 quaternions and the slerp between them leave, rad and m."""
-NEUTRAL = np.tile(TRUNK_FROM_NEUTRAL, (1, 1))
 NOTHING = np.full(4, np.nan)
 
 Messages = list[tuple[keys.Key, bytes]]

@@ -4,9 +4,7 @@ import numpy as np
 import pytest
 
 from brachium_body import rotation
-from brachium_body.kinematics import (
-    TRUNK_FROM_NEUTRAL,
-)
+from brachium_body.kinematics import TRUNK_FROM_NEUTRAL
 from brachium_body.lengths import from_height
 from brachium_fusion.pipeline import Pipeline
 from brachium_fusion.settings import Change, Settings

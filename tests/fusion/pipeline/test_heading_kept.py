@@ -4,9 +4,7 @@ import numpy as np
 
 from brachium_body import rotation
 from brachium_body.angles import SHOULDER
-from brachium_body.kinematics import (
-    TRUNK_FROM_NEUTRAL,
-)
+from brachium_body.kinematics import TRUNK_FROM_NEUTRAL
 from brachium_body.segments import arm_segments
 from brachium_fusion.settings import Settings
 from brachium_wire import keys

@@ -4,9 +4,7 @@ import numpy as np
 import pytest
 
 from brachium_body.angles import ELBOW, SHOULDER, WRIST
-from brachium_body.kinematics import (
-    JOINTS,
-)
+from brachium_body.kinematics import JOINTS
 
 MS = 1_000_000
 

@@ -1,6 +1,5 @@
 """A router gone during a set: nothing is said to be kept that is not, and a stop stops all the same."""
 
-import socket
 import threading
 
 import pytest
@@ -17,10 +16,8 @@ EXERCISE = {"exercise": "elbow-flexion", "side": "right"}
 class Router:
     """A router that ends and begins again at one port."""
 
-    def __init__(self) -> None:
-        with socket.socket() as probe:
-            probe.bind(("127.0.0.1", 0))
-            self.settings = RouterSettings(port=int(probe.getsockname()[1]))
+    def __init__(self, port: int) -> None:
+        self.settings = RouterSettings(port=port)
         self.begin()
 
     def begin(self) -> None:
@@ -35,8 +32,8 @@ class Router:
 
 
 @pytest.fixture
-def router():
-    one = Router()
+def router(unused_port):
+    one = Router(unused_port())
     yield one
     one.end()
 
